@@ -51,6 +51,7 @@ def dynamics_of(robot: Robot, plant: PlantParameters) -> Dynamics:
         lag=plant.lag,
         delay=plant.delay,
         needs_tilt=robot.needs_tilt,
+        attitude=robot.attitude,
         uncertainty=uncertainty_of(plant),
     )
 

@@ -10,10 +10,13 @@ import numpy as np
 
 from pipeline.estimation.standing_camera import StandingPose
 from pipeline.frames import Array
-from pipeline.robot import Robot, TwistDrive
+from pipeline.robot import AttitudeDrive, Robot, TwistDrive
 
 ROUNDING = 1.0 + 1e-6
 """Commands travel as float32: by this factor they may be larger than they were."""
+
+ATTITUDE_VALUES = 4  # of an `AttitudeCommand`
+LIFT = slice(3, 4)  # which of them is the thrust
 
 NOT_MEASURED = -1.0
 """Age of a twist that nobody measured [s]."""
@@ -142,13 +145,35 @@ class TwistCommand:
         return cls(np.zeros(6), armed=False)
 
 
-RobotCommand = ThrustCommand | TwistCommand
+@dataclass(frozen=True, slots=True, eq=False)
+class AttitudeCommand:
+    """Set-point for the next period, of a robot that keeps an attitude by itself."""
+
+    attitude: Array
+    """(4,) roll, pitch [rad], yaw rate [rad/s] and thrust along the body's z axis [N]; roll and
+    pitch turn h, f's axes below the body's heading, into b: R_hb = R_y(pitch) R_x(roll)."""
+    armed: bool
+    """Thrust is meant. False demands zeros, as of thrusts."""
+    stop: bool = False
+    """Somebody pressed STOP: zero at once."""
+
+    @classmethod
+    def zero(cls) -> AttitudeCommand:
+        """Level, no thrust, disarmed."""
+        return cls(np.zeros(ATTITUDE_VALUES), armed=False)
+
+
+RobotCommand = ThrustCommand | TwistCommand | AttitudeCommand
 """What robots are told; each takes one kind, which `[link] takes` of its file names."""
 
 
 def zero_command(robot: Robot) -> RobotCommand:
     """Nothing, disarmed, of the kind that `robot` takes."""
-    return TwistCommand.zero() if robot.twist else ThrustCommand.zero(robot.A.shape[1])
+    if robot.twist is not None:
+        return TwistCommand.zero()
+    if robot.attitude is not None:
+        return AttitudeCommand.zero()
+    return ThrustCommand.zero(robot.A.shape[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,8 +261,8 @@ def check_command(command: RobotCommand, thrusters: int, f_max: float) -> None:
     Raises:
         FollowerError: says what is allowed.
     """
-    if isinstance(command, TwistCommand):
-        raise FollowerError("a twist", f"{thrusters} thrusts: this robot takes nothing else")
+    if not isinstance(command, ThrustCommand):
+        raise FollowerError(_said(command), f"{thrusters} thrusts: this robot takes nothing else")
     thrusts = command.thrusts
     if thrusts.shape != (thrusters,):
         raise FollowerError(f"thrusts of shape {thrusts.shape}", f"({thrusters},)")
@@ -255,8 +280,8 @@ def check_twist(command: RobotCommand, drive: TwistDrive) -> None:
     Raises:
         FollowerError: says what is allowed.
     """
-    if isinstance(command, ThrustCommand):
-        raise FollowerError("thrusts", "a twist: this robot takes nothing else")
+    if not isinstance(command, TwistCommand):
+        raise FollowerError(_said(command), "a twist: this robot takes nothing else")
     twist_in_b = command.twist_in_b
     if twist_in_b.shape != (6,):
         raise FollowerError(f"twist of shape {twist_in_b.shape}", "(6,)")
@@ -267,6 +292,38 @@ def check_twist(command: RobotCommand, drive: TwistDrive) -> None:
         raise FollowerError(f"twist {twist_in_b}", allowed)
     if (command.stop or not command.armed) and bool(twist_in_b.any()):
         raise FollowerError(f"twist {twist_in_b} with `stop` or without `armed`", "zeros")
+
+
+def check_attitude(command: RobotCommand, drive: AttitudeDrive, most: float) -> None:
+    """Refuse what no robot that takes attitude and thrust, of `most` [N], may be told.
+
+    Raises:
+        FollowerError: says what is allowed.
+    """
+    if not isinstance(command, AttitudeCommand):
+        raise FollowerError(_said(command), "attitude and thrust: this robot takes nothing else")
+    told = command.attitude
+    if told.shape != (ATTITUDE_VALUES,):
+        raise FollowerError(f"attitude of shape {told.shape}", f"({ATTITUDE_VALUES},)")
+    if not bool(np.isfinite(told).all()):
+        raise FollowerError(f"attitude {told}", "finite numbers")
+    roll, pitch, yaw_rate, thrust = told.tolist()
+    if drive.exceeds(roll, pitch, yaw_rate, ROUNDING):
+        allowed = f"no more than {drive.max_tilt:.3g} rad and {drive.yaw_rate:.3g} rad/s"
+        raise FollowerError(f"attitude {told}", allowed)
+    if not 0.0 <= thrust <= most * ROUNDING:
+        raise FollowerError(f"thrust {thrust:g} N", f"0 to {most:g} N")
+    if (command.stop or not command.armed) and bool(told.any()):
+        raise FollowerError(f"attitude {told} with `stop` or without `armed`", "zeros")
+
+
+def _said(command: RobotCommand) -> str:
+    match command:
+        case ThrustCommand():
+            return "thrusts"
+        case TwistCommand():
+            return "a twist"
+    return "attitude and thrust"
 
 
 @runtime_checkable

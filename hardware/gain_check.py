@@ -76,4 +76,4 @@ def loop_of(robot_file: RobotFile, gains: Gains) -> Loop:
 def controlled(robot_file: RobotFile) -> list[int]:
     """Axes that the gains are for, roll and pitch of a tilting robot among them."""
     robot = robot_file.robot
-    return [int(axis) for axis in np.flatnonzero(robot.axes | robot.wrench_axes)]
+    return [int(axis) for axis in np.flatnonzero(robot.loop_axes)]

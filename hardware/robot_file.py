@@ -32,11 +32,13 @@ from hardware.robot_physics import allocation_matrix, faults, led_faults
 from hardware.robot_schema import (
     AXES,
     USUAL_PORTS,
+    AttitudeSection,
     BatterySection,
     BodyImuSection,
     FlightControllerSection,
     IdentifiedSuspension,
     Interval,
+    MavlinkSection,
     R_from_axes,
     RobotSchema,
     Stand,
@@ -45,7 +47,6 @@ from hardware.robot_schema import (
 )
 from hardware.twist_schema import (
     FrankaSection,
-    MavlinkSection,
     MotionSection,
     Ros2Section,
     TwistRobotSchema,
@@ -56,10 +57,12 @@ from hardware.twist_schema import (
 )
 from pipeline.frames import GRAVITY, Array
 from pipeline.gains import Gains
-from pipeline.robot import Robot, ToldMotion
+from pipeline.robot import AttitudeDrive, Robot, ToldMotion
 
-COMMANDS = ("thrusts", "twist")
+COMMANDS = ("thrusts", "twist", "attitude")
 """What robots are told, by `[link] takes`."""
+BY_GAINS = ("thrusts", "attitude")
+"""Those of robots that are led by the PID, whose gains their files have."""
 ROBOTS = Path(__file__).parent / "robots"
 
 
@@ -126,6 +129,8 @@ class MavlinkParameters:
     """ODOMETRY or LOCAL_POSITION_NED."""
     vision: bool = False
     """It is told where a phone that stands sees it."""
+    hover_thrust: float | None = None
+    """By which, 0 to 1, it hovers; None: 1 is what all its thrusters give."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +244,7 @@ def robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
     takes = link.get("takes") if isinstance(link, Mapping) else None
     if takes == "twist":
         return _twist_robot_of(table, file)
-    if "twist" in table and takes not in COMMANDS:
+    if "twist" in table and takes not in ("thrusts", "attitude"):
         said = "missing" if takes is None else repr(takes)
         raise RobotFileError(file, "link.takes", f"{said}; allowed with [twist]: 'twist'")
     try:
@@ -430,6 +435,7 @@ def _converted(schema: RobotSchema) -> RobotFile:
         damping_in_f=damping_in_f,
         thrust_lag_s=plant.lag,
         thrust_delay_s=plant.delay,
+        attitude=_attitude(schema.attitude),
     )
     gains = {
         name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))
@@ -441,6 +447,8 @@ def _converted(schema: RobotSchema) -> RobotFile:
         schema.link.host,
         schema.link.port or USUAL_PORTS[schema.link.kind],
         schema.link.max_rise_per_command_n,
+        schema.link.takes,
+        mavlink=_mavlink(schema.link.mavlink) if schema.link.kind == "mavlink" else None,
     )
     return RobotFile(
         robot,
@@ -546,6 +554,19 @@ def _mavlink(section: MavlinkSection | None) -> MavlinkParameters:
         section.own_component,
         section.twist_from,
         section.vision,
+        section.hover_thrust,
+    )
+
+
+def _attitude(section: AttitudeSection | None) -> AttitudeDrive | None:
+    if section is None:
+        return None
+    return AttitudeDrive(
+        max_tilt=radians(section.max_tilt_deg),
+        yaw_rate=radians(section.yaw_rate_deg_s),
+        lag_s=section.lag_s,
+        delay_s=section.delay_s,
+        yaw_lag_s=section.yaw_lag_s,
     )
 
 

@@ -51,6 +51,8 @@ def faults(robot: Robot, plant: PlantParameters) -> Iterator[tuple[str, str]]:
         yield "thrusters.f_min_n", "below f_max_n"
     yield from _thruster_faults(plant)
     yield from _axes_faults(robot)
+    if robot.attitude is not None and not robot.needs_tilt:
+        yield "link.takes", "'thrusts': with 'attitude' all thrusters push along b's z axis"
     yield from _wrench_faults(robot, plant)
     yield from led_faults(robot.leds_in_b)
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from pipeline.frames import Array
+from pipeline.frames import GRAVITY, Array
 
 Axis = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 AXES: tuple[Axis, ...] = get_args(Axis)
@@ -91,6 +91,21 @@ class Thrusters(Section):
     units: Annotated[list[Thruster], Field(min_length=2, max_length=16)]
 
 
+class AttitudeSection(Section):
+    """[attitude]: how a robot that takes attitude and thrust follows them."""
+
+    max_tilt_deg: Annotated[float, Field(ge=2.0, le=45.0)]
+    """It may be told to lean so far."""
+    yaw_rate_deg_s: Annotated[float, Field(gt=0.0, le=360.0)]
+    """Largest."""
+    lag_s: Annotated[float, Field(gt=0.0, le=1.0)]
+    """From a tilt told to the body's: the time constants of two equal lags together."""
+    delay_s: Annotated[float, Field(ge=0.0, le=0.5)]
+    """From a command to its beginning."""
+    yaw_lag_s: Annotated[float, Field(gt=0.0, le=1.0)]
+    """Time constant of a yaw rate."""
+
+
 class BodyImuSection(Section):
     """[body_imu]: of one axis."""
 
@@ -134,6 +149,24 @@ class GainsSection(Section):
     """[N s/m, N m s/rad]."""
 
 
+class MavlinkSection(Section):
+    """[link.mavlink]: who an autopilot is, and how it says that it moves; see `link/mavlink/`."""
+
+    system: Annotated[int, Field(ge=1, le=255)] = 1
+    """MAV_SYSID, SYSID_THISMAV."""
+    component: Annotated[int, Field(ge=1, le=255)] = 1
+    """MAV_COMP_ID_AUTOPILOT1."""
+    own_component: Annotated[int, Field(ge=1, le=255)] = 191
+    """Ours in that system: MAV_COMP_ID_ONBOARD_COMPUTER."""
+    twist_from: Literal["LOCAL_POSITION_NED", "ODOMETRY"] = "LOCAL_POSITION_NED"
+    """The first with ATTITUDE or ATTITUDE_QUATERNION beside."""
+    vision: bool = False
+    """It is told where a phone that stands sees it."""
+    hover_thrust: Annotated[float, Field(ge=0.05, le=0.95)] | None = None
+    """The thrust, 0 to 1, by which it hovers: MPC_THR_HOVER, MOT_THST_HOVER. Of a robot that takes
+    `attitude`; without it 1 is that of all its thrusters."""
+
+
 USUAL_PORTS = {"franka": 1337, "mavlink": 14540, "ros2": 7400, "rpit": 31415}
 """Ports of kinds of links that have one which everybody uses: franka's of TCP, others of UDP."""
 
@@ -143,8 +176,9 @@ class LinkSection(Section):
 
     kind: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")] = "udp"
     """`udp` is our own link, `rpit` RPIt's; others by the entry points `lightleash.followers`."""
-    takes: Literal["thrusts"] = "thrusts"
-    """What the robot is told; files of those that take a `twist` have `twist_schema.py`."""
+    takes: Literal["thrusts", "attitude"] = "thrusts"
+    """What the robot is told: `attitude` is roll, pitch, yaw rate and thrust; files of those that
+    take a `twist` have `twist_schema.py`."""
     stopped_by: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     """Who or what stops the robot when it hears nothing, if its link does not see to that."""
     host: Annotated[str, Field(min_length=1, max_length=253)]
@@ -152,6 +186,8 @@ class LinkSection(Section):
     port: Annotated[int, Field(ge=1, le=65535)] | None = None
     """Where the robot listens; with `rpit`, where we do. May be missing if it has a usual one."""
     max_rise_per_command_n: Positive
+    """Of each thruster; of one that takes `attitude` of all together."""
+    mavlink: MavlinkSection | None = None
 
 
 Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -266,6 +302,7 @@ class RobotSchema(Section):
     start: Start = Start()
     air: Air
     thrusters: Thrusters
+    attitude: AttitudeSection | None = None
     body_imu: BodyImuSection
     leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     gains: Annotated[dict[str, GainsSection], Field(min_length=1)]
@@ -283,6 +320,7 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
     if robot.flight_controller is not None:
         yield from _miswired(robot.flight_controller, len(robot.thrusters.units))
     yield from battery_clashes(robot.battery)
+    yield from _attitude_clashes(robot)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     if robot.suspension is None and robot.identified.suspension is not None:
@@ -299,6 +337,33 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
         yield "stand", "[stand], or [suspension] for a robot that hangs"
     if robot.ramp_s is None:
         yield "ramp_s", "how long a ramp to zero thrust lasts [s]: there is no [suspension]"
+
+
+def _attitude_clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
+    """Of what a robot takes, and by which link."""
+    link, takes = robot.link, robot.link.takes == "attitude"
+    if takes != (robot.attitude is not None):
+        yield "attitude", "with link.takes = 'attitude', and with it alone"
+    if takes and robot.keeps_attitude_in_ramp:
+        yield "keeps_attitude_in_ramp", "only with takes = 'thrusts': it keeps it all the time"
+    if takes and robot.flight_controller is not None:
+        yield "flight_controller", "only with takes = 'thrusts', which it turns into motors"
+    yield from mavlink_clashes(link.kind, link.mavlink)
+    hover = link.mavlink.hover_thrust if link.mavlink is not None else None
+    most = len(robot.thrusters.units) * robot.thrusters.f_max_n
+    if hover is not None and hover * most > robot.body.mass_kg * GRAVITY:
+        each = robot.body.mass_kg * GRAVITY / hover / len(robot.thrusters.units)
+        yield "thrusters.f_max_n", f"{each:.2f} or less: more is above 1 by hover_thrust"
+
+
+def mavlink_clashes(kind: str, section: MavlinkSection | None) -> Iterator[tuple[str, str]]:
+    """The same of [link.mavlink]."""
+    if section is None:
+        return
+    if kind != "mavlink":
+        yield "link.mavlink", f"only with kind = 'mavlink', not {kind!r}"
+    if section.own_component == section.component:
+        yield "link.mavlink.own_component", "another one than the autopilot's"
 
 
 def battery_clashes(battery: BatterySection | None) -> Iterator[tuple[str, str]]:

@@ -19,12 +19,14 @@ from hardware.robot_schema import (
     BodyImuSection,
     Direction,
     LedSection,
+    MavlinkSection,
     Section,
     Start,
     ToolSection,
     Vector,
     axes_fault,
     battery_clashes,
+    mavlink_clashes,
 )
 from pipeline.control.twist_margins import LEAST_PHASE_RAD
 from pipeline.robot import ToldMotion, TwistDrive
@@ -155,21 +157,6 @@ class FrankaSection(Section):
     """Refuse a computer whose kernel has no real time, as Franka demands one."""
 
 
-class MavlinkSection(Section):
-    """[link.mavlink]: who an autopilot is, and how it says that it moves; see `link/mavlink/`."""
-
-    system: Annotated[int, Field(ge=1, le=255)] = 1
-    """MAV_SYSID, SYSID_THISMAV."""
-    component: Annotated[int, Field(ge=1, le=255)] = 1
-    """MAV_COMP_ID_AUTOPILOT1."""
-    own_component: Annotated[int, Field(ge=1, le=255)] = 191
-    """Ours in that system: MAV_COMP_ID_ONBOARD_COMPUTER."""
-    twist_from: Literal["LOCAL_POSITION_NED", "ODOMETRY"] = "LOCAL_POSITION_NED"
-    """The first with ATTITUDE or ATTITUDE_QUATERNION beside."""
-    vision: bool = False
-    """It is told where a phone that stands sees it."""
-
-
 class TwistLinkSection(Section):
     """[link] of a robot that takes a twist."""
 
@@ -255,7 +242,7 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     if robot.arm is not None and (robot.arm.tool_joint is None) != (robot.tool is None):
         yield "arm.tool_joint", "with [tool], and with it alone"
     yield from _motion_clashes(robot)
-    for kind in ("ros2", "franka", "mavlink"):
+    for kind in ("ros2", "franka"):
         if robot.link.kind != kind and getattr(robot.link, kind) is not None:
             yield f"link.{kind}", f"only with kind = {kind!r}, not {robot.link.kind!r}"
     yield from _ros2_clashes(robot.link, robot.motion, robot.arm)
@@ -295,15 +282,15 @@ def _motion_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
 
 def _mavlink_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     link, motion = robot.link, robot.motion
+    yield from mavlink_clashes(link.kind, link.mavlink)
     if link.kind != "mavlink":
         return
     if tilting := [axis for axis in robot.axes if axis in ("roll", "pitch")]:
         yield "axes", f"without {' and '.join(tilting)}: an autopilot tilts as it must"
     if motion is not None and motion.twist != "measured":
         yield "motion.twist", "'measured': an autopilot says how it moves"
-    section = link.mavlink
-    if section is not None and section.own_component == section.component:
-        yield "link.mavlink.own_component", "another one than the autopilot's"
+    if link.mavlink is not None and link.mavlink.hover_thrust is not None:
+        yield "link.mavlink.hover_thrust", "only with takes = 'attitude'"
 
 
 def _ros2_clashes(

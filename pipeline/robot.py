@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import pi
+from math import hypot, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -62,6 +62,34 @@ class TwistDrive:
         """Whether a twist (6,) is larger than is allowed by more than a factor of rounding."""
         v, omega = (float(np.linalg.norm(half)) for half in _halves(twist_in_b))
         return v > self.speed * rounding or omega > self.rate * rounding
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeDrive:
+    """How a robot that takes attitude and thrust follows its tilt and its yaw rate."""
+
+    max_tilt: float
+    """It may be told to lean so far [rad]."""
+    yaw_rate: float
+    """Largest [rad/s]."""
+    lag_s: float
+    """From a tilt told to the body's: two equal lags behind each other, both together ..."""
+    delay_s: float
+    """... and from a command to its beginning [s]."""
+    yaw_lag_s: float
+    """Time constant by which it follows a yaw rate, after the same delay."""
+
+    def within(self, roll: float, pitch: float, yaw_rate: float) -> Array:
+        """The same (3,) [rad, rad, rad/s], no farther and no faster than it may be told."""
+        leans = hypot(roll, pitch)
+        share = 1.0 if leans <= self.max_tilt else self.max_tilt / leans
+        turns = min(max(yaw_rate, -self.yaw_rate), self.yaw_rate)
+        return np.array([share * roll, share * pitch, turns])
+
+    def exceeds(self, roll: float, pitch: float, yaw_rate: float, rounding: float = 1.0) -> bool:
+        """Whether it leans farther or turns faster than allowed by more than a factor."""
+        leans = hypot(roll, pitch) > self.max_tilt * rounding
+        return leans or abs(yaw_rate) > self.yaw_rate * rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +165,9 @@ class Robot:
     twist: TwistDrive | None = None
     """Of a robot that takes a twist: it has no thrusters (m = 0), and who drives it carries it, so
     that mass and inertia count for nothing."""
+    attitude: AttitudeDrive | None = None
+    """Of a robot that takes attitude and thrust: its thrusters are told nothing, and who keeps its
+    attitude turns them."""
     motion: ToldMotion | None = None
     """Of one that has no motion sensors on its body: its twist stands for them."""
     tool: str = ""
@@ -167,3 +198,8 @@ class Robot:
         tilting = np.array([False, False, True, True, True, False])
         kept: npt.NDArray[np.bool_] = tilting | (self.axes & ~np.array([True, True, *4 * [False]]))
         return kept
+
+    @property
+    def loop_axes(self) -> npt.NDArray[np.bool_]:
+        """(6,) which axes' loops control closes, roll and pitch of one that tilts among them."""
+        return self.axes if self.attitude is not None else self.axes | self.wrench_axes

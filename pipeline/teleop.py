@@ -1,4 +1,4 @@
-"""The paper's Fig. 4 on one screen: `Teleop.step` from measurements to thrusts or a twist."""
+"""The paper's Fig. 4 on one screen: `Teleop.step` from measurements to thrusts or a set-point."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Inputs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """Thrusts or a twist for the robot, and everything worth seeing on the way to them."""
+    """Thrusts or a set-point for the robot, and everything worth seeing on the way to them."""
 
     t: float
     thrusts: Array
@@ -100,6 +100,9 @@ class Output:
     """Those that don't give what they are told, in words."""
     twist_in_b: Array | None = None
     """(6,) [m/s, rad/s], of a robot that takes a twist."""
+    attitude: Array | None = None
+    """(4,) roll, pitch [rad], yaw rate [rad/s] and thrust [N], of a robot that takes them: the
+    thrusts are then what they should make of it."""
 
 
 class Teleop:
@@ -210,6 +213,7 @@ class Teleop:
             ages=ages,
             thrusters=self._acting.weak_thrusters,
             twist_in_b=acted.twist_in_b,
+            attitude=acted.attitude,
         )
 
     @property

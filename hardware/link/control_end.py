@@ -18,13 +18,16 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.follower import (
+    LIFT,
     STOPPED,
+    AttitudeCommand,
     BlinkOrder,
     BodySample,
     RobotCommand,
     RobotHealth,
     ThrustCommand,
     TwistCommand,
+    check_attitude,
     check_command,
     check_twist,
 )
@@ -45,7 +48,7 @@ from hardware.link.tool_datagram import ToolDatagram, encode_tool
 from hardware.robot_file import RobotFile
 from pipeline.config import PERIOD_S
 from pipeline.frames import Array
-from pipeline.robot import TwistDrive
+from pipeline.robot import AttitudeDrive, TwistDrive
 
 SENT_KEPT = 256
 """Commands remembered: 1.3 s."""
@@ -72,17 +75,19 @@ class ControlEnd:
         twist: TwistDrive | None = None,
         *,
         tells_motion: bool = False,
+        attitude: AttitudeDrive | None = None,
     ) -> None:
         """Begin with a robot: thrusters give up to `f_max`, rise by `max_rise` per command [N].
 
-        One that takes a `twist` has no thrusters, and one that `tells_motion` no motion sensors.
-        `epoch` must be later than that of every control process the robot has followed.
+        One that takes a `twist` has no thrusters, and one that `tells_motion` no motion sensors; of
+        one that takes an `attitude` all its thrusters together rise so. `epoch` must be later than
+        that of every control process the robot has followed.
         """
         self.thrusters, self.epoch = thrusters, epoch
         self._f_max, self._max_rise = f_max, max_rise
         self._key, self._new_challenge = key, challenges
         self._counter = 0
-        self._twist, self._tells_motion = twist, tells_motion
+        self._twist, self._attitude, self._tells_motion = twist, attitude, tells_motion
         self._last = self._zero()
         self._sent_at = [0.0] * SENT_KEPT
         self._challenges = [0] * SENT_KEPT
@@ -115,6 +120,7 @@ class ControlEnd:
             challenges,
             robot.twist,
             tells_motion=robot.motion is not None,
+            attitude=robot.attitude,
         )
 
     def command(self, command: RobotCommand, now: float) -> bytes:
@@ -133,10 +139,7 @@ class ControlEnd:
         Raises:
             FollowerError: a command no robot may be told.
         """
-        if self._twist is None:
-            check_command(command, self.thrusters, self._f_max)
-        else:
-            check_twist(command, self._twist)
+        self._check(command)
         if not command.armed and self._newest and self._is_outdated(self._newest):
             self._renew(self._newest)
         self._counter = (self._counter + 1) % U32
@@ -151,14 +154,19 @@ class ControlEnd:
             nonce=self._newest.nonce if self._newest else 0,
             challenge=challenge,
             armed=command.armed,
-            thrusts=() if self._twist else values,
+            thrusts=values if isinstance(command, ThrustCommand) else (),
             stop=command.stop,
-            twist_in_b=values if self._twist else (),
+            twist_in_b=values if isinstance(command, TwistCommand) else (),
+            attitude=values if isinstance(command, AttitudeCommand) else (),
         )
 
     def zero(self) -> RobotCommand:
         """Nothing, disarmed, of the kind that the robot takes."""
-        return TwistCommand.zero() if self._twist else ThrustCommand.zero(self.thrusters)
+        if self._twist is not None:
+            return TwistCommand.zero()
+        if self._attitude is not None:
+            return AttitudeCommand.zero()
+        return ThrustCommand.zero(self.thrusters)
 
     def blink(self, order: BlinkOrder) -> bytes:
         """The datagram for `order`; it is no command, and counts as none."""
@@ -245,19 +253,25 @@ class ControlEnd:
         self._last = self._zero()
 
     def _zero(self) -> Array:
-        return np.zeros(6) if self._twist else np.zeros(self.thrusters)
+        return _values(self.zero())
+
+    def _check(self, command: RobotCommand) -> None:
+        if self._twist is not None:
+            check_twist(command, self._twist)
+        elif self._attitude is not None:
+            check_attitude(command, self._attitude, self.thrusters * self._f_max)
+        else:
+            check_command(command, self.thrusters, self._f_max)
 
     def _slowed(self, command: RobotCommand) -> Array:
         """What is commanded, no faster than the robot takes: late is better than refused."""
-        if isinstance(command, ThrustCommand):
-            thrusts = command.thrusts
-            slowed: Array = np.minimum(thrusts, self._last + self._max_rise)
-            self.limited += int(bool((slowed < thrusts).any()))
-            return slowed
-        wanted = command.twist_in_b
-        if self._twist is None or not wanted.any():  # zero is never late
-            return wanted
-        slowed = self._twist.toward(self._last, wanted, PERIOD_S)
+        wanted = slowed = _values(command)
+        if self._twist is None:
+            rises = slice(None) if self._attitude is None else LIFT
+            slowed = wanted.copy()
+            slowed[rises] = np.minimum(wanted[rises], self._last[rises] + self._max_rise)
+        elif wanted.any():  # zero is never late
+            slowed = self._twist.toward(self._last, wanted, PERIOD_S)
         self.limited += int(bool((slowed != wanted).any()))
         return slowed
 
@@ -266,3 +280,13 @@ class ControlEnd:
         if sample.epoch != self.epoch or behind >= SENT_KEPT or sample.accepted == 0:
             return None
         return now - self._sent_at[sample.accepted % SENT_KEPT]
+
+
+def _values(command: RobotCommand) -> Array:
+    """What is commanded, of whatever kind."""
+    match command:
+        case ThrustCommand():
+            return command.thrusts
+        case TwistCommand():
+            return command.twist_in_b
+    return command.attitude

@@ -39,7 +39,9 @@ Sample, robot → control (92 + 4 m bytes), pushed at the robot's own rate:
 A robot that takes a twist has datagrams of the same fields with magics `LLtc` and `LLts`, m = 6,
 and in place of the thrusts its twist: velocity [m/s] and angular rate [rad/s] of the body in f, in
 axes of b; commanded in a command, measured in a sample. `deploy/watchdog/` does not know them and
-refuses them as malformed.
+refuses them as malformed. Nor does it know the command of a robot that takes attitude and thrust,
+of the magic `LLac`, m = 4: roll, pitch [rad], yaw rate [rad/s] and thrust [N]. Samples of such a
+robot are those of one that takes thrusts.
 
 Samples of such a robot without motion sensors have the magic `LLto`, and in place of gyroscope and
 accelerometer how long before the time of the sample its twist was measured (f32 [s], 0 to 10; −1:
@@ -53,18 +55,20 @@ in `robot_end.py`, and in C in `deploy/watchdog/`; what control believes is in `
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite
 from typing import Any
 
-from hardware.follower import NOT_MEASURED, FollowerState, Refusal
+from hardware.follower import ATTITUDE_VALUES, NOT_MEASURED, FollowerState, Refusal
 from hardware.link.link_key import MAC_BYTES, is_authentic, mac
 from pipeline.frames import Triple
 
 VERSION = 2  # of these datagrams
 COMMAND_MAGIC, SAMPLE_MAGIC = b"LLcm", b"LLsm"
 TWIST_COMMAND_MAGIC, TWIST_SAMPLE_MAGIC = b"LLtc", b"LLts"
+ATTITUDE_COMMAND_MAGIC = b"LLac"
 ODOMETRY_MAGIC = b"LLto"
 """Of a sample of a robot that takes a twist and has no motion sensors."""
 OLDEST_TWIST_S = 10.0
@@ -75,7 +79,6 @@ COMMAND_OVERHEAD, SAMPLE_OVERHEAD = 36 + MAC_BYTES, 76 + MAC_BYTES  # bytes
 MAX_BYTES = SAMPLE_OVERHEAD + 4 * MAX_THRUSTERS
 ARMED, STOP = 1, 2
 """Bits of a command's flags."""
-Values = tuple[float, ...]
 NOTHING_FELT = (0.0,) * 6
 """By gyroscope and accelerometer, where there are none."""
 U32, U64 = 1 << 32, 1 << 64
@@ -105,21 +108,23 @@ class CommandDatagram:
     challenge: int
     armed: bool
     thrusts: tuple[float, ...]
-    """[N]; may be anything a float can be. None in a command of a twist."""
+    """[N]; may be anything a float can be. None in a command of something else."""
     stop: bool = False
     """Somebody pressed STOP."""
     twist_in_b: tuple[float, ...] = ()
     """(6,) [m/s, rad/s], or none."""
+    attitude: tuple[float, ...] = ()
+    """(4,) [rad, rad, rad/s, N], or none."""
 
     @property
-    def is_twist(self) -> bool:
-        """It commands a twist, not thrusts."""
-        return bool(self.twist_in_b)
+    def shape(self) -> tuple[int, int, int]:
+        """How many thrusts, numbers of a twist, of an attitude it has: all but one are none."""
+        return len(self.thrusts), len(self.twist_in_b), len(self.attitude)
 
     @property
     def values(self) -> tuple[float, ...]:
-        """What is commanded: thrusts or a twist."""
-        return self.twist_in_b or self.thrusts
+        """What is commanded, of whatever kind."""
+        return self.twist_in_b or self.attitude or self.thrusts
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,9 +163,13 @@ def _sample_layout(thrusters: int) -> struct.Struct:
 
 def encode_command(command: CommandDatagram, key: bytes) -> bytes:
     """Encode a command."""
-    values = command.values
+    values, magic = command.values, COMMAND_MAGIC
+    if command.twist_in_b:
+        magic = TWIST_COMMAND_MAGIC
+    elif command.attitude:
+        magic = ATTITUDE_COMMAND_MAGIC
     body = _command_layout(len(values)).pack(
-        TWIST_COMMAND_MAGIC if command.is_twist else COMMAND_MAGIC,
+        magic,
         VERSION,
         len(values),
         ARMED * command.armed | STOP * command.stop,
@@ -205,15 +214,26 @@ def decode_command(data: bytes, key: bytes) -> CommandDatagram:
     Raises:
         LinkError: not a command of this version, not made with the key, or with unknown flags.
     """
-    magics = COMMAND_MAGIC, (TWIST_COMMAND_MAGIC,)
-    is_twist, count = _checked(data, key, *magics, COMMAND_OVERHEAD)
+    magics = {COMMAND_MAGIC: 0, TWIST_COMMAND_MAGIC: TWIST_VALUES}
+    magics[ATTITUDE_COMMAND_MAGIC] = ATTITUDE_VALUES
+    magic, count = _checked(data, key, magics, COMMAND_OVERHEAD)
     fields = _command_layout(count).unpack(data[:-MAC_BYTES])
     flags, epoch, nonce, challenge, counter = fields[3:8]
     if flags & ~(ARMED | STOP):
         raise LinkError("command.flags", "bits 0 and 1")
     armed, stop = bool(flags & ARMED), bool(flags & STOP)
-    thrusts, twist_in_b = _thrusts_or_twist(fields[8:], is_twist)
-    return CommandDatagram(epoch, counter, nonce, challenge, armed, thrusts, stop, twist_in_b)
+    of = {one: fields[8:] if one == magic else () for one in magics}
+    return CommandDatagram(
+        epoch,
+        counter,
+        nonce,
+        challenge,
+        armed,
+        thrusts=of[COMMAND_MAGIC],
+        stop=stop,
+        twist_in_b=of[TWIST_COMMAND_MAGIC],
+        attitude=of[ATTITUDE_COMMAND_MAGIC],
+    )
 
 
 def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
@@ -223,8 +243,8 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         LinkError: not a sample of this version, not made with the key, or with a value that
             can't be.
     """
-    magics = SAMPLE_MAGIC, (TWIST_SAMPLE_MAGIC, ODOMETRY_MAGIC)
-    is_twist, count = _checked(data, key, *magics, SAMPLE_OVERHEAD)
+    magics = {SAMPLE_MAGIC: 0, TWIST_SAMPLE_MAGIC: TWIST_VALUES, ODOMETRY_MAGIC: TWIST_VALUES}
+    magic, count = _checked(data, key, magics, SAMPLE_OVERHEAD)
     fields = _sample_layout(count).unpack(data[:-MAC_BYTES])
     state, refusal, t_us, nonce, challenge, epoch, boot_id, counter, accepted = fields[3:12]
     values = fields[12:]
@@ -234,9 +254,9 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         raise LinkError("sample.time", "0 to 2^60 µs")
     if not all(map(isfinite, values)):
         raise LinkError("sample.gyroscope, accelerometer, thrusts", "finite numbers")
-    thrusts, twist_in_b = _thrusts_or_twist(values[6:], is_twist)
+    is_twist = magic != SAMPLE_MAGIC
     felt, age_s = values[0:6], None
-    if data[:4] == ODOMETRY_MAGIC:
+    if magic == ODOMETRY_MAGIC:
         age_s, felt = felt[0], NOTHING_FELT
         if values[1:6] != NOTHING_FELT[1:] or not (
             0.0 <= age_s <= OLDEST_TWIST_S or age_s == NOT_MEASURED
@@ -254,40 +274,34 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         accepted=accepted,
         omega_in_b=felt[0:3],
         a_in_b=felt[3:6],
-        thrusts=thrusts,
-        twist_in_b=twist_in_b,
+        thrusts=() if is_twist else values[6:],
+        twist_in_b=values[6:] if is_twist else (),
         twist_age_s=age_s,
     )
 
 
-def _thrusts_or_twist(values: Values, is_twist: bool) -> tuple[Values, Values]:
-    """(Thrusts, twist), one of them none."""
-    return ((), values) if is_twist else (values, ())
-
-
 def _checked(
-    data: bytes, key: bytes, of_thrusts: bytes, of_twists: tuple[bytes, ...], overhead: int
-) -> tuple[bool, int]:
-    """(Whether it is of a twist, how many values) of an authentic datagram.
+    data: bytes, key: bytes, magics: Mapping[bytes, int], overhead: int
+) -> tuple[bytes, int]:
+    """(Magic, how many values) of an authentic datagram.
 
-    By the magic of thrusts and those of a twist; `overhead` is its size without its values.
+    `magics` say how many values they have, 0: as many as it says; `overhead` is its size without.
     """
-    magics = of_thrusts, *of_twists
     if not overhead < len(data) <= MAX_BYTES:
         raise LinkError("size", f"{overhead + 4} to {overhead + 4 * MAX_THRUSTERS} bytes")
-    if data[:4] not in magics:
+    magic = data[:4]
+    if magic not in magics:
         raise LinkError("magic", " or ".join(map(repr, magics)))
     if data[4] != VERSION:
         raise LinkError("version", f"{VERSION}")
-    thrusters = data[5]
-    if not 1 <= thrusters <= MAX_THRUSTERS or len(data) != overhead + 4 * thrusters:
+    count = data[5]
+    if not 1 <= count <= MAX_THRUSTERS or len(data) != overhead + 4 * count:
         raise LinkError("thrusters", f"1 to {MAX_THRUSTERS}, agreeing with the size")
-    is_twist = data[:4] in of_twists
-    if is_twist and thrusters != TWIST_VALUES:
-        raise LinkError("values", f"{TWIST_VALUES} of a twist")
+    if magics[magic] and count != magics[magic]:
+        raise LinkError("values", f"{magics[magic]} with this magic")
     if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
         raise LinkError("mac", "made with the robot's key")
-    return is_twist, thrusters
+    return magic, count
 
 
 def is_later(a: int, b: int) -> bool:

@@ -53,7 +53,7 @@ class GateHere:
         self._end = RobotEnd(self._limits, self._boot_id, self._key)
 
     def command(self, command: RobotCommand, now: float) -> Array:
-        """What the robot is to be told: thrusts (m,) [N] or twist (6,) in b [m/s, rad/s].
+        """What the robot is to be told, of whatever kind it takes: see `RobotEnd.setpoint`.
 
         Raises:
             FollowerError: a command no robot may be told.
@@ -87,7 +87,10 @@ class GateHere:
         omega_in_b: Triple = NOTHING,
         a_in_b: Triple = NOTHING,
     ) -> BodySample | None:
-        """The sample of a robot that moves by a twist (6,) in b; None: not to be believed."""
+        """The sample of a robot that `moves` by a twist (6,) in b, or gives thrusts (m,) [N].
+
+        None: not to be believed.
+        """
         data = self._end.sample(_us(dated), random_u64(), omega_in_b, a_in_b, moves, twist_age_s)
         return self._control.receive(data, now)
 

@@ -14,7 +14,9 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
    of the epoch or STOP cuts the ramp short, nothing else that arrives changes it. Who gives no
    thrust has nothing to ramp: COAST lasts those 400 ms.
    A robot that takes a twist reads *twist* for thrust: within its speeds, changing no faster than
-   its accelerations, and in silence braked by them from 60 ms on (`given_twist.py`).
+   its accelerations, and in silence braked by them from 60 ms on (`given_twist.py`). One that takes
+   attitude and thrust leans and turns no farther than it may, and in silence goes level within
+   100 ms while its thrust fades (`given_attitude.py`).
 3. After that, and after a start: no thrust until zero thrust of a *later* epoch has been taken for
    500 ms without a gap of 60 ms. So a control process begins with zero, and one that was frozen
    or replaced never comes back. Zero of a later epoch is taken in every state, since the newest
@@ -73,10 +75,12 @@ from math import isfinite
 import numpy as np
 
 from hardware.attitude_keeper import AttitudeGains, AttitudeKeeper
-from hardware.follower import STOPPED, EStop, FollowerState, Refusal
+from hardware.follower import ATTITUDE_VALUES, STOPPED, EStop, FollowerState, Refusal
+from hardware.given_attitude import GivenAttitude
 from hardware.given_thrusts import GivenThrusts
 from hardware.given_twist import GivenTwist
 from hardware.link.datagram import (
+    TWIST_VALUES,
     U32,
     CommandDatagram,
     LinkError,
@@ -89,7 +93,7 @@ from hardware.link.silence import SilenceTimes
 from hardware.robot_file import RobotFile
 from pipeline.config import HoldConfig
 from pipeline.frames import Array, Triple
-from pipeline.robot import TwistDrive
+from pipeline.robot import AttitudeDrive, TwistDrive
 
 Peer = tuple[str, int]
 """Address and port."""
@@ -129,6 +133,8 @@ class LinkLimits:
     """Of a robot that flies and keeps upright by itself."""
     twist: TwistDrive | None = None
     """Of a robot that takes a twist, and no thrusts."""
+    attitude_drive: AttitudeDrive | None = None
+    """Of one that takes attitude and thrust."""
 
     @classmethod
     def of(cls, robot_file: RobotFile) -> LinkLimits:
@@ -143,12 +149,23 @@ class LinkLimits:
             if robot_file.keeps_attitude_in_ramp
             else None,
             twist=robot.twist,
+            attitude_drive=robot.attitude,
         )
 
-    def given(self, keeper: AttitudeKeeper | None) -> GivenThrusts | GivenTwist:
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Of its commands; see `CommandDatagram.shape`."""
+        if self.twist is not None:
+            return 0, TWIST_VALUES, 0
+        return (0, 0, ATTITUDE_VALUES) if self.attitude_drive else (self.thrusters, 0, 0)
+
+    def given(self, keeper: AttitudeKeeper | None) -> GivenThrusts | GivenTwist | GivenAttitude:
         """What keeps and fades the commands of such a robot."""
         if self.twist is not None:
             return GivenTwist(self.twist)
+        if self.attitude_drive is not None:
+            most = self.thrusters * self.f_max
+            return GivenAttitude(self.attitude_drive, most, self.max_rise, self.ramp_us)
         return GivenThrusts(self.thrusters, self.f_max, self.max_rise, self.ramp_us, keeper)
 
 
@@ -212,7 +229,7 @@ class RobotEnd:
         return epoch == self._newest[0] and age_us is not None and age_us <= self._limits.max_age_us
 
     def setpoint(self, now_us: int) -> Array:
-        """Thrusts (m,) [N] or twist (6,) [m/s, rad/s] that the robot is to give now."""
+        """What the robot is to give now: thrusts (m,), a twist (6,), attitude and thrust (4,)."""
         self._advance(now_us)
         return self._given.at(now_us)
 
@@ -324,7 +341,7 @@ class RobotEnd:
 
     def _judge(self, command: CommandDatagram, now_us: int) -> Refusal:
         limits = self._limits
-        if len(command.thrusts) != limits.thrusters:
+        if command.shape != limits.shape:
             return Refusal.THRUSTERS
         age_us = self._age_us(command.nonce, now_us)
         if age_us is None:

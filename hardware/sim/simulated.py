@@ -17,6 +17,7 @@ from hardware.link.robot_server import TICK_US
 from hardware.link.tool_end import ToolEnd
 from hardware.robot_file import RobotFile
 from hardware.sim.battery import DrainingBattery
+from hardware.sim.plant.attitude_plant import AttitudePlant
 from hardware.sim.plant.odometry import Odometry
 from hardware.sim.plant.plant import Plant, PlantOptions
 from hardware.sim.plant.twist_plant import TwistPlant
@@ -178,6 +179,8 @@ def _body_of(
     robot_file: RobotFile, rng: np.random.Generator, options: PlantOptions | None
 ) -> SimulatedBody:
     robot, plant = robot_file.robot, robot_file.plant
+    if robot.attitude is not None:
+        return AttitudePlant(plant, robot.attitude, rng, options)
     if robot.twist is None:
         return Plant(plant, rng, options)
     if plant.arm is None:

@@ -42,11 +42,14 @@ class Acted:
     """What the robot is told."""
 
     thrusts: Array
-    """(m,) [N]; none of a robot that takes a twist."""
+    """(m,) [N]; none of a robot that takes a twist. Of one that takes attitude and thrust: what
+    its thrusters should then give, level or not."""
     saturated: bool
     """It can't do all that is wanted."""
     twist_in_b: Array | None = None
     """(6,) velocity and angular rate of the body, in b [m/s, rad/s], of a robot that takes it."""
+    attitude: Array | None = None
+    """(4,) roll, pitch [rad], yaw rate [rad/s] and thrust [N] of a robot that takes them."""
 
 
 class Acting(Protocol):

@@ -1,4 +1,8 @@
-"""The last step of Fig. 4: a wrench that is wanted → thrusts, and what of it could not be had."""
+"""The last step of Fig. 4: a wrench that is wanted → thrusts, and what of it could not be had.
+
+Of a robot that takes attitude and thrust the thrusts are what its own mixer is expected to give,
+but for the torques by which it turns; it is told the attitude beside.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import numpy as np
 
 from pipeline.config import TeleopConfig
 from pipeline.control.allocation import Allocation
+from pipeline.control.attitude_setpoint import AttitudeSetPoint
 from pipeline.control.tilt import TiltToMove
 from pipeline.frames import Array
 from pipeline.robot import Robot
@@ -30,6 +35,8 @@ class ThrustDemand:
     missing_in_b: Array
     """(6,) wanted wrench less what they give; for whoever integrates."""
     saturated: bool
+    attitude: Array | None = None
+    """(4,) roll, pitch [rad], yaw rate [rad/s] and thrust [N] of a robot that takes them."""
 
 
 class Actuation:
@@ -43,6 +50,8 @@ class Actuation:
         """(6, m): what its thrusters truly give of what they are told, as far as it is known."""
         self._allocation = Allocation(robot, config.allocation)
         self._tilt = TiltToMove(robot, config.gains, config.tilt) if robot.needs_tilt else None
+        drive = robot.attitude
+        self._set_point = AttitudeSetPoint(drive, robot) if drive else None
         self.push_in_b = np.zeros(6)
         """Given beside what is asked for, a disturbance for experiments. Sec. V-C."""
         self.can_hover = True
@@ -71,10 +80,15 @@ class Actuation:
         lever = float(np.linalg.norm(self._robot.A[3:], axis=0).max())
         return bool((np.abs(missing_in_b) <= HOVERS * weight * np.repeat((1.0, lever), 3)).all())
 
+    def learn(self, R_fb: Array, h: float) -> None:
+        """Before what is given for a known attitude, `h` [s] after the last."""
+        if self._set_point is not None:
+            self._set_point.learn(R_fb, h)
+
     def give(
-        self, wrench_in_b: Array, R_fb: Array, turned_in_b: Array, omega_in_b: Array
+        self, wrench_in_b: Array, R_fb: Array, turned_in_b: Array, omega_in_b: Array, h: float
     ) -> ThrustDemand:
-        """Thrusts for a wrench (6,) at the attitude R_fb.
+        """Thrusts for a wrench (6,) at the attitude R_fb, `h` [s] after the last.
 
         One that must tilt goes by how far it will have turned (3,) and its angular rate (3,) then.
         """
@@ -83,14 +97,23 @@ class Actuation:
             thrusts = self._allocation.thrusts(pushed_in_b)
             missing_in_b = (pushed_in_b - self.A @ thrusts) * self._axes
             return ThrustDemand(thrusts, missing_in_b, _is_short(missing_in_b))
-        tilting = self._tilt.wrench(wrench_in_b, R_fb, turned_in_b, omega_in_b) + self.push_in_b
+        force_in_b = self._tilt.force_in_b(wrench_in_b[:3], R_fb)
+        torque_in_b = np.array([0.0, 0.0, wrench_in_b[5]])
+        if self._set_point is None:
+            torque_in_b[:2] = self._tilt.torque_in_b(force_in_b, turned_in_b, omega_in_b)
+        lift = max(float(force_in_b[2]), 0.0)
+        tilting = np.array([0.0, 0.0, lift, *torque_in_b]) + self.push_in_b
         thrusts = self._allocation.thrusts(tilting)
-        missing_in_b = (tilting - self.A @ thrusts) * self._axes
+        given_in_b = self.A @ thrusts
+        missing_in_b = (tilting - given_in_b) * self._axes
         saturated = _is_short(missing_in_b) or _is_short(self._tilt.refused_in_b)
         # sideways it has what the limit of the tilt left, once the body has turned there
         missing_in_b[:3] += self._tilt.refused_in_b
         missing_in_b[3:5] = 0.0
-        return ThrustDemand(thrusts, missing_in_b, saturated)
+        if self._set_point is None:
+            return ThrustDemand(thrusts, missing_in_b, saturated)
+        told = self._set_point.of(R_fb @ force_in_b, given_in_b, R_fb, omega_in_b, h)
+        return ThrustDemand(thrusts, missing_in_b, saturated, told)
 
 
 def _is_short(missing_in_b: Array) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pipeline.control.uncertainty import ASSUMED, Uncertainty
 from pipeline.frames import Array
+from pipeline.robot import AttitudeDrive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,5 +25,7 @@ class Dynamics:
     """From command to thruster [s]."""
     needs_tilt: bool = False
     """x and y are forced by turning the thrust with the roll and pitch loops."""
+    attitude: AttitudeDrive | None = None
+    """Who turns the body in place of those loops, and to what yaw rate: its own autopilot."""
     uncertainty: Uncertainty = ASSUMED
     """By how much the robot may be another one."""

@@ -21,7 +21,7 @@ from math import inf
 
 import numpy as np
 
-from pipeline.control.margins import OMEGA, TILT_AXIS, Complex, Loop, Sensing, is_stable
+from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, is_stable, turns_to_move
 from pipeline.control.robust_margins import bodies
 
 
@@ -43,7 +43,7 @@ def parts(loop: Loop, axis: int, sensing: Sensing) -> tuple[Complex, Complex]:
     Raises:
         ValueError: a robot that leans to go there: its two loops are not the sum of such parts.
     """
-    if loop.dynamics.needs_tilt and axis in TILT_AXIS:
+    if turns_to_move(loop.dynamics, axis):
         raise ValueError(f"axis {axis} of a robot that leans; allowed: 2 to 5")
     whole, _ = loop.open_loop(axis, sensing)
     by_body, _ = loop.open_loop(axis, replace(sensing, sees=False))
@@ -52,7 +52,7 @@ def parts(loop: Loop, axis: int, sensing: Sensing) -> tuple[Complex, Complex]:
 
 def worst_jitter(loop: Loop, axis: int, sensing: Sensing) -> JitterMargins:
     """Of all bodies that the robot may be; `UNJUDGED` where one is unstable as it is, or leans."""
-    if loop.dynamics.needs_tilt and axis in TILT_AXIS:
+    if turns_to_move(loop.dynamics, axis):
         return UNJUDGED
     pictures = body = inf
     for one in bodies(loop):

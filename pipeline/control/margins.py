@@ -29,10 +29,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.config import PERIOD_S, EstimatorName, FeedForwardConfig, MarginsConfig
+from pipeline.control.attitude_setpoint import SMOOTH_S
 from pipeline.control.delay_compensation import DISTURBANCE_HZ
 from pipeline.control.dynamics import Dynamics
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.gains import Gains
+from pipeline.robot import AttitudeDrive
 
 Complex = npt.NDArray[np.complex128]
 
@@ -46,6 +48,7 @@ LEAST_DAMPING: Final = 0.01
 """Share of the critical one: without any, a pendulum's pole lies on the axis of the response."""
 TILT_AXIS: Final = {0: 4, 1: 3}
 """x is pushed along by pitch, y by roll."""
+HEIGHT: Final = 2  # the axis z
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +154,8 @@ class Loop:
         """Transfer function from the command of a force or torque to it."""
         d = self.dynamics
         thrusters = _thrusters(d)
+        if d.attitude is not None and axis != HEIGHT:
+            return _by_autopilot(d.attitude, self._told.attitude or d.attitude, axis)
         if not d.needs_tilt or axis not in TILT_AXIS:
             return thrusters
         turn = TILT_AXIS[axis]
@@ -192,6 +197,11 @@ class Loop:
     def _felt(self, axis: int, sensing: Sensing) -> Complex:
         """Force or torque that control takes the body's felt acceleration for, by its place."""
         return np.asarray(self._told.inertia[axis] * S * S * _late(sensing.body_age))
+
+
+def turns_to_move(dynamics: Dynamics, axis: int) -> bool:
+    """Whether it goes along this axis by a loop of ours that turns it, and which is judged, too."""
+    return dynamics.needs_tilt and dynamics.attitude is None and axis in TILT_AXIS
 
 
 def unlike(loop: Loop, axes: Iterable[int]) -> list[int]:
@@ -238,8 +248,7 @@ def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
 
 def _stable_open_loop(loop: Loop, axis: int, sensing: Sensing) -> Complex | None:
     """L(jω), None if it is unstable when closed: how often 1 + L goes round −1 tells it."""
-    tilting = loop.dynamics.needs_tilt and axis in TILT_AXIS
-    if tilting and not is_stable(loop, TILT_AXIS[axis], sensing):
+    if turns_to_move(loop.dynamics, axis) and not is_stable(loop, TILT_AXIS[axis], sensing):
         return None
     L, poles = loop.open_loop(axis, sensing)
     beyond = 1.0 + L
@@ -274,6 +283,20 @@ def _critical_factors(L: Complex) -> Iterator[float]:
 def _thrusters(dynamics: Dynamics) -> Complex:
     """Transfer function from the command of a force or torque to it, of one that never tilts."""
     return np.asarray(_late(dynamics.delay) / (1.0 + dynamics.lag * S) * _hold(PERIOD_S))
+
+
+def _by_autopilot(drive: AttitudeDrive, told: AttitudeDrive, axis: int) -> Complex:
+    """From a force aside, or a yaw torque, that is wanted to it: who is told tilt and yaw rate.
+
+    What the rate is led by (`attitude_setpoint.py`) cancels its lag but for the delay between, and
+    for what is `told` of it.
+    """
+    late = _late(drive.delay_s) * _hold(PERIOD_S)
+    if axis in TILT_AXIS:
+        ahead = (1.0 + 0.5 * told.lag_s * S) / (1.0 + SMOOTH_S * S)
+        return np.asarray(late * ahead / (1.0 + 0.5 * drive.lag_s * S) ** 2)
+    rated = told.yaw_lag_s / drive.yaw_lag_s
+    return np.asarray(rated * late / (1.0 + (1.0 - late) / (drive.yaw_lag_s * S)))
 
 
 def _low_pass(hz: float) -> Complex:

@@ -19,6 +19,7 @@ import numpy as np
 
 from pipeline.control.dynamics import Dynamics
 from pipeline.control.margins import AxisMargins, Loop, Sensing, axis_margins
+from pipeline.robot import AttitudeDrive
 
 MIN_PHASE_RAD: Final = pi / 6.0
 MIN_GAIN: Final = 2.0
@@ -95,6 +96,13 @@ def bodies(loop: Loop) -> Iterator[Loop]:
         yield replace(loop, dynamics=dynamics, config=config, nominal=nominal)
 
 
+def _slower(drive: AttitudeDrive | None, factor: float) -> AttitudeDrive | None:
+    """One whose own loops are not as quick as told, either."""
+    if drive is None:
+        return None
+    return replace(drive, lag_s=factor * drive.lag_s, yaw_lag_s=factor * drive.yaw_lag_s)
+
+
 def _dynamics(told: Dynamics) -> Iterator[Dynamics]:
     """Those of every body: the corners of what was identified, a grid of what is assumed."""
     doubt = told.uncertainty
@@ -108,6 +116,7 @@ def _dynamics(told: Dynamics) -> Iterator[Dynamics]:
             inertia=inertia * told.inertia,
             lag=lag * told.lag,
             delay=max(told.delay + delay, 0.0),
+            attitude=_slower(told.attitude, lag),
             stiffness=np.maximum(told.stiffness + stiffness, 0.0),
             damping=damping,
         )

@@ -1,7 +1,11 @@
-"""A robot that is told thrusts: PID, feed-forward, hold and station, given by its thrusters."""
+"""A robot that is told thrusts: PID, feed-forward, hold and station, given by its thrusters.
+
+So is one that is told attitude and thrust: but for the very last step, which its autopilot does.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, radians
 from typing import Final
 
@@ -38,6 +42,13 @@ class ThrustActing:
         self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
         self._actuation = Actuation(robot, config)
         self._thruster_health = ThrusterHealth(robot)
+        self._told_each = robot.attitude is None
+        """Its thrusters are told by us, so that what each of them gives can be judged."""
+        self._nothing = Acted(
+            np.zeros(robot.A.shape[1]),
+            saturated=False,
+            attitude=None if robot.attitude is None else np.zeros(4),
+        )
         self._thrusts = np.zeros(robot.A.shape[1])
         self._station = StationKeeping(config.station, config.gains, robot)
         # what stands on the floor brakes and stays by itself
@@ -78,7 +89,7 @@ class ThrustActing:
 
     def watch(self, obeyed: bool, body: BodyImu, h: float) -> None:
         """While the robot obeys: does each thruster give what it was told?"""
-        if not obeyed:
+        if not (obeyed and self._told_each):
             self._thruster_health.start()
         elif self._thruster_health.follow(self._thrusts, body, h):
             self._actuation.weaken(self._thruster_health.gains)
@@ -200,6 +211,7 @@ class ThrustActing:
         if mode == Mode.TRACK and known and reference and leashed:
             R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
             turned_in_b, omega_in_b = self._tracking.body_ahead(omega_bf_in_b)
+            self._actuation.learn(R_fb, now.h)
             shares_in_f = _shares_in_f(leashed, now.leading)
             wrench_in_b = self._tracking.wrench(  # Eq. (20)
                 known, reference, leashed.error, now.h, shares_in_f, leashed.brakes_in_f
@@ -211,15 +223,15 @@ class ThrustActing:
             # it falls, or lies there: thrust that is to fade for seconds only throws it about
             self._tumbled |= self._flies and mode == Mode.RAMP and self._hold.R_fb[2, 2] < TUMBLED
             if self._tumbled:
-                return Acted(np.zeros_like(self._thrusts), saturated=True)
+                return replace(self._nothing, saturated=True)
             # what is no place any more does not become one again: where it went meanwhile is lost
             self._stays = self._stays and not self._is_astray
             if mode == Mode.COAST and self._stays:
                 wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
             R_fb, turned_in_b, omega_in_b = self._hold.R_fb, np.zeros(3), omega_m_bf_in_b
         else:
-            return Acted(np.zeros_like(self._thrusts), saturated=False)
-        given = self._actuation.give(wrench_in_b, R_fb, turned_in_b, omega_in_b)
+            return self._nothing
+        given = self._actuation.give(wrench_in_b, R_fb, turned_in_b, omega_in_b, now.h)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
         news = low_pass.share(now.h / MEAN_S)
         self._mean_force_in_f = self._mean_force_in_f + news * (
@@ -227,9 +239,11 @@ class ThrustActing:
         )
         if mode == Mode.TRACK and leashed is not None and known is not None:
             self._tracking.learn(leashed.error, known.view, given.missing_in_b, now.h)
-        if not np.isfinite(given.thrusts).all():
-            return Acted(np.zeros_like(given.thrusts), saturated=True)
-        return Acted(given.thrusts * share, given.saturated)
+        told = np.zeros(0) if given.attitude is None else given.attitude
+        if not (np.isfinite(given.thrusts).all() and np.isfinite(told).all()):
+            return replace(self._nothing, saturated=True)
+        attitude = None if given.attitude is None else told * (1.0, 1.0, 1.0, share)
+        return Acted(given.thrusts * share, given.saturated, attitude=attitude)
 
 
 def _shares_in_f(leashed: Leashed, leading: Leading) -> Array | None:

@@ -20,31 +20,31 @@ LEAST_LIFT = 0.2
 
 
 class TiltToMove:
-    """A wrench that asks for any force → one that thrusters along b's z axis can give."""
+    """Any force that is wanted → one that thrusters along b's z axis can give, once turned."""
 
     def __init__(self, robot: Robot, gains: Gains, config: TiltConfig) -> None:
-        """Roll and pitch rows of `gains` are those of the attitude."""
+        """Roll and pitch rows of `gains` are those of the attitude, if nobody else keeps it."""
         self._least = max(LEAST_LIFT * robot.weight_to_carry, robot.f_min)
-        self._slope = tan(config.max_tilt_rad)
+        drive = robot.attitude
+        own = config.max_tilt_rad if drive is None else drive.max_tilt
+        self._slope = tan(min(config.max_tilt_rad, own))
         self._Kp, self._Kd = gains.Kp[3:5], gains.Kd[3:5]
         self.refused_in_b = np.zeros(3)
-        """Force that the limit of the tilt cut off, at the last wrench (3,) [N]."""
+        """Force that the limit of the tilt cut off, at the last force (3,) [N]."""
 
-    def wrench(
-        self, wrench_in_b: Array, R_fb: Array, turned_in_b: Array, omega_in_b: Array
-    ) -> Array:
-        """(6,) thrust along z and torques for a wanted wrench (6,); its roll and pitch don't count.
+    def force_in_b(self, wanted_in_b: Array, R_fb: Array) -> Array:
+        """The force (3,) [N] along which the body's z axis is to point: no farther than allowed."""
+        force_in_b: Array = R_fb.T @ self._within_limit(R_fb @ wanted_in_b)
+        self.refused_in_b = wanted_in_b - force_in_b
+        return force_in_b
 
-        The body turns until its z axis points along the wanted force, no farther than the limit; it
-        will have turned (3,) [rad] when the torque acts, and will turn at `omega_in_b` (3,).
+    def torque_in_b(self, force_in_b: Array, turned_in_b: Array, omega_in_b: Array) -> Array:
+        """(2,) about x and y [N m], by which the body turns its z axis there.
+
+        It will have turned (3,) [rad] when the torque acts, and will turn at `omega_in_b` (3,).
         """
-        wanted_in_f = R_fb @ wrench_in_b[:3]
-        force_in_f = self._within_limit(wanted_in_f)
-        force_in_b = R_fb.T @ force_in_f
-        self.refused_in_b = wrench_in_b[:3] - force_in_b
         left = _turn_of_z_to(exp(turned_in_b).T @ force_in_b)
-        torque_in_b = self._Kp * left - self._Kd * omega_in_b[:2]
-        return np.array([0.0, 0.0, max(force_in_b[2], 0.0), *torque_in_b, wrench_in_b[5]])
+        return self._Kp * left - self._Kd * omega_in_b[:2]
 
     def _within_limit(self, force_in_f: Array) -> Array:
         lift = max(float(force_in_f[2]), self._least)

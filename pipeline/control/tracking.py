@@ -32,6 +32,7 @@ class Tracking:
     def __init__(self, robot: Robot, config: TeleopConfig) -> None:
         """For one robot."""
         self._robot = robot
+        self._turns = robot.needs_tilt and robot.attitude is None
         self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
         self._looks_ahead = config.feedforward.enabled
         self._ahead = FeedForward(robot, config.feedforward)
@@ -106,10 +107,10 @@ class Tracking:
     def body_ahead(self, omega_bf_in_b: Array) -> tuple[Array, Array]:
         """How far a body of this rate will have turned (3,) [rad], and its rate (3,) [rad/s] then.
 
-        When that which is decided now acts. Only one that must tilt to move goes by it: of others
-        it is not worked out.
+        When that which is decided now acts. Only one that tilts by its own torques goes by it: of
+        others it is not worked out.
         """
-        if not (self._looks_ahead and self._robot.needs_tilt):
+        if not (self._looks_ahead and self._turns):
             return np.zeros(3), omega_bf_in_b
         return self._compensation.body(omega_bf_in_b)
 

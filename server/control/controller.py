@@ -7,7 +7,7 @@ from math import inf
 
 import numpy as np
 
-from hardware.follower import RobotCommand, ThrustCommand, TwistCommand
+from hardware.follower import AttitudeCommand, RobotCommand, ThrustCommand, TwistCommand
 from hardware.link.robot_end import SILENCE
 from hardware.link.silence import SilenceTimes
 from pipeline.config import PERIOD_S, TeleopConfig
@@ -38,7 +38,7 @@ SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
 STOOD_STILL_S = SILENCE.coasts_s
 """Between two ticks, at most: after so long a robot behind our own link coasts."""
-TIME_DECIMALS, THRUST_DECIMALS = 6, 4
+TIME_DECIMALS, COMMAND_DECIMALS = 6, 4
 """Of commands in recordings: 1 µs, 0.1 mN. All digits of a float would be three times as long."""
 UNTOLD = RobotCondition()
 TooLate = Callable[[float, float], str]
@@ -168,8 +168,11 @@ class Controller:
         stop = output.failsafe.mode == Mode.STOPPED
         if output.twist_in_b is not None:
             return TwistCommand(output.twist_in_b, output.armed, stop), output
-        thrusts = np.round(output.thrusts, THRUST_DECIMALS).tolist()
-        self._commands.append((round(now, TIME_DECIMALS), *thrusts))
+        told = output.thrusts if output.attitude is None else output.attitude
+        rounded = np.round(told, COMMAND_DECIMALS).tolist()
+        self._commands.append((round(now, TIME_DECIMALS), *rounded))
+        if output.attitude is not None:
+            return AttitudeCommand(output.attitude, output.armed, stop), output
         return ThrustCommand(output.thrusts, output.armed, stop), output
 
     def _sort(
@@ -250,7 +253,7 @@ class Controller:
         samples, self._body_samples = self._body_samples, []
         twists, self._body_twists = self._body_twists, []
         commands, self._commands = self._commands, []
-        twist_in_b = output.twist_in_b
+        twist_in_b, attitude = output.twist_in_b, output.attitude
         return ControlStatus(
             t=output.t,
             epoch=epoch,
@@ -295,6 +298,7 @@ class Controller:
             next_lead=Lead.of(self.teleop.next_leading),
             thrusters_weak=list(output.thrusters),
             at_limit=output.at_limit,
+            attitude=None if attitude is None else (*triple(attitude[:3]), float(attitude[3])),
             twist_in_b=None
             if twist_in_b is None
             else (*triple(twist_in_b[:3]), *triple(twist_in_b[3:])),

@@ -104,10 +104,14 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Each that does not give what it is told, in words."""
     twist_in_b: tuple[float, float, float, float, float, float] | None = None
     """Told to a robot that takes a twist, which has no thrusts: v, ω in b [m/s, rad/s]."""
+    attitude: tuple[float, float, float, float] | None = None
+    """Told to a robot that takes it: roll, pitch [rad], yaw rate [rad/s], thrust [N]; `thrusts` are
+    then what they should make of it."""
     body_twists: list[BodyRow] = []
     """What such a robot measures, of each of `body_samples`: t, v, ω in b."""
     commands: list[tuple[float, ...]] = []
-    """Thrusts commanded since the last status, for recordings: each time t, then `thrusts`."""
+    """Commanded since the last status, for recordings: each time t, then `attitude` of a robot that
+    takes it, `thrusts` of one that takes these."""
     at_limit: bool = False
     """The robot is led to where it can't go, or can't be held by its thrusters."""
     gains_weak: str = ""

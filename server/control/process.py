@@ -126,9 +126,7 @@ def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate
     robot, plant = robot_file.robot, robot_file.plant
     if robot.twist is not None:
         return partial(twist_refusal, robot.twist)
-    guard = LatencyGuard(
-        dynamics_of(robot, plant), robot.axes | robot.wrench_axes, robot_file.gains, config
-    )
+    guard = LatencyGuard(dynamics_of(robot, plant), robot.loop_axes, robot_file.gains, config)
     return partial(guard.refusal, gains, config.estimator)
 
 
@@ -161,8 +159,9 @@ def never_stops(robot_file: RobotFile) -> str:
 
 def never_upright(robot_file: RobotFile) -> str:
     """Why never to arm a robot that would turn over when this process dies, or ""."""
-    falls = robot_file.robot.weight_to_carry > 0.0 and not robot_file.keeps_attitude_in_ramp
-    return UPRIGHT if falls else ""
+    robot = robot_file.robot
+    keeps_it = robot_file.keeps_attitude_in_ramp or robot.attitude is not None
+    return UPRIGHT if robot.weight_to_carry > 0.0 and not keeps_it else ""
 
 
 def _key() -> bytes:

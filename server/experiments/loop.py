@@ -11,7 +11,7 @@ from typing import get_args
 
 import numpy as np
 
-from hardware.robot_file import load_robot
+from hardware.robot_file import BY_GAINS, load_robot
 from hardware.sim.hand import make_hand
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
@@ -77,7 +77,7 @@ def draw(traces: Sequence[tuple[TrackingFigures, TrackingTrace]], path: Path) ->
 @experiment("loop")
 def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     """Fly each hand in virtual time through rendered, encoded pictures."""
-    robot_file = load_robot(arguments.robot)
+    robot_file = load_robot(arguments.robot, takes=BY_GAINS)
     virtual_camera, estimator = TeleopConfig().virtual_camera, arguments.estimator
     config = teleop_config(robot_file, arguments.gains, virtual_camera, estimator)
     for hand in arguments.hands:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hardware.dynamics import dynamics_of, uncertainty_of
-from hardware.robot_file import RobotFile, load_robot
+from hardware.robot_file import BY_GAINS, RobotFile, load_robot
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
 from pipeline.control.jitter_margins import worst_jitter
@@ -91,7 +91,7 @@ def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Margi
         )
         for estimator in arguments.estimator:
             sensing = Sensing(estimator, 1e-3 * arguments.latency_ms, 1e-3 * arguments.body_age_ms)
-            for axis in np.flatnonzero(robot.axes | robot.wrench_axes):
+            for axis in np.flatnonzero(robot.loop_axes):
                 yield row(gains, loop, int(axis), sensing)
 
 
@@ -125,7 +125,7 @@ def verdicts(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[s
     feedforward = replace(config.feedforward, enabled=arguments.feedforward)
     guard = LatencyGuard(
         dynamics_of(robot, robot_file.plant),
-        robot.axes | robot.wrench_axes,
+        robot.loop_axes,
         robot_file.gains,
         replace(config, feedforward=feedforward),
     )
@@ -168,7 +168,7 @@ def draw(found: list[MarginRow], path: Path) -> Path:
 @experiment("margins")
 def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     """Every axis' margins and what arming says; 1 if a wanted gain set is unknown."""
-    robot_file = load_robot(arguments.robot)
+    robot_file = load_robot(arguments.robot, takes=BY_GAINS)
     for gains in arguments.gains:
         if gains not in robot_file.gains:
             print(f"gains: {gains!r} is not one of {', '.join(robot_file.gains)}")

@@ -51,6 +51,7 @@ TWIST_NAMES = (
     *("told_wx_rad_s", "told_wy_rad_s", "told_wz_rad_s"),
 )
 """Of a twist told, velocity and angular rate in the body's axes."""
+ATTITUDE_NAMES = "told_roll_rad", "told_pitch_rad", "told_yaw_rate_rad_s", "told_thrust_n"
 _SENSELESS = msgspec.MsgspecError, UnicodeDecodeError, RecursionError
 """What is raised of JSON that is none, or of another kind."""
 ALARMING = (Mode.COAST, Mode.RAMP, Mode.STOPPED)
@@ -115,6 +116,7 @@ class RecordedState(msgspec.Struct, frozen=True):
     thrusts: list[float] = []
     saturated: bool = False
     twist_in_b: tuple[float, float, float, float, float, float] | None = None
+    attitude: tuple[float, float, float, float] | None = None
     body_samples: list[BodyRow] = []
     commands: list[tuple[float, ...]] = []
     estimate: EstimateFields | None = None
@@ -133,8 +135,8 @@ class RecordedState(msgspec.Struct, frozen=True):
 
     @property
     def command(self) -> Sequence[float]:
-        """Thrusts [N], or v and ω in b [m/s, rad/s]; as `DecodedRecording.command_names` has it."""
-        return self.thrusts if self.twist_in_b is None else self.twist_in_b
+        """What the robot was told, as `DecodedRecording.command_names` has it."""
+        return self.twist_in_b or self.attitude or self.thrusts
 
     @property
     def time_offset_sigma(self) -> float | None:
@@ -179,6 +181,8 @@ class DecodedRecording:
         robot = self.robot.robot
         if robot.twist is not None:
             return TWIST_NAMES
+        if robot.attitude is not None:
+            return ATTITUDE_NAMES
         return tuple(f"thrust_{k}_n" for k in range(robot.A.shape[1]))
 
     def utc(self, t: float) -> str:

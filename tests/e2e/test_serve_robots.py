@@ -25,7 +25,7 @@ FOLLOWS_S = 6.0
 
 
 @pytest.mark.parametrize(
-    ("robot", "seconds", "bound_mm"), [("quadrotor", 14, 60), ("ground", 8, 40)]
+    ("robot", "seconds", "bound_mm"), [("quadrotor", 14, 60), ("copter", 14, 60), ("ground", 8, 40)]
 )
 def test_a_virtual_phone_leads_the_robot_the_server_names(
     robot: str, seconds: float, bound_mm: float

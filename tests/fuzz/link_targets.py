@@ -18,6 +18,7 @@ from hardware.follower import (
 from hardware.link.blink_datagram import LASTS_MS, BlinkDatagram, decode_blink, encode_blink
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import (
+    ATTITUDE_COMMAND_MAGIC,
     COMMAND_MAGIC,
     MAX_THRUSTERS,
     NOTHING_FELT,
@@ -67,6 +68,8 @@ def command_seeds():
         yield encode_command(command, KEY)[:-MAC_BYTES]
     twist = CommandDatagram(5, 7, 11, 13, True, (), twist_in_b=(0.1, -0.2, 0.3, 0.0, 0.5, 1.0))
     yield encode_command(twist, KEY)[:-MAC_BYTES]
+    attitude = CommandDatagram(5, 7, 11, 13, True, (), attitude=(0.1, -0.2, 0.5, 11.0))
+    yield encode_command(attitude, KEY)[:-MAC_BYTES]
 
 
 def has_nan(thrusts) -> bool:
@@ -85,9 +88,9 @@ def command(data: bytes) -> None:
     assert 1 <= len(decoded.values) <= MAX_THRUSTERS
     again = encode_command(decoded, KEY)
     assert again[: len(data)] == data or has_nan(decoded.values)  # a NaN may come out quiet
-    assert data[:4] == (TWIST_COMMAND_MAGIC if decoded.is_twist else COMMAND_MAGIC)
-    assert len(decoded.twist_in_b) == 6 * decoded.is_twist
-    assert bool(decoded.thrusts) != decoded.is_twist
+    count = data[5]
+    shapes = {COMMAND_MAGIC: (count, 0, 0), TWIST_COMMAND_MAGIC: (0, 6, 0)}
+    assert decoded.shape == (shapes | {ATTITUDE_COMMAND_MAGIC: (0, 0, 4)})[data[:4]]
 
 
 def sample_seeds():

@@ -90,7 +90,7 @@ def test_its_leds_are_on_the_cameras_side_at_arms_length_and_not_in_a_plane():
     assert np.linalg.svd(leds - leds.mean(axis=0), compute_uv=False)[-1] > 0.1
 
 
-@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground", "twister", "rover"])
+@pytest.mark.parametrize("robot", ["ames", "quadrotor", "copter", "ground", "twister", "rover"])
 def test_every_number_says_what_it_rests_on(robot):
     text = (ROBOTS / f"{robot}.toml").read_text(encoding="utf-8")
     for line in text[: text.index("[body_imu]")].splitlines():
@@ -253,6 +253,55 @@ OTHERS_MISTAKES = {
         "[identified.suspension]\nlength_m = { found = 1.0, half_95 = 0.1 }\n[air]",
         "identified.suspension",
         "only with [suspension]",
+    ),
+    "an attitude that nobody takes": (
+        "copter",
+        'takes = "attitude"',
+        "",
+        "attitude",
+        "with link.takes = 'attitude'",
+    ),
+    "an attitude taken without saying how": (
+        "quadrotor",
+        "port = 47001",
+        'port = 47001\ntakes = "attitude"',
+        "attitude",
+        "and with it alone",
+    ),
+    "who keeps it all the time": (
+        "copter",
+        "(?m)^ramp_s",
+        "keeps_attitude_in_ramp = true\nramp_s",
+        "keeps_attitude_in_ramp",
+        "it keeps it all the time",
+    ),
+    "a flight controller's motors": (
+        "copter",
+        r"\[body_imu\]",
+        '[flight_controller]\nstopped_by = "me"\nmotors = [1, 2, 3, 4]\n[body_imu]',
+        "flight_controller",
+        "takes = 'thrusts'",
+    ),
+    "more thrust than its autopilot's 1": (
+        "copter",
+        'takes = "attitude"',
+        'takes = "attitude"\nkind = "mavlink"\nmavlink = { hover_thrust = 0.5 }',
+        "thrusters.f_max_n",
+        "5.88 or less",
+    ),
+    "another link's section": (
+        "copter",
+        'takes = "attitude"',
+        'takes = "attitude"\nmavlink = { system = 2 }',
+        "link.mavlink",
+        "only with kind = 'mavlink'",
+    ),
+    "a lean beyond any": (
+        "copter",
+        "max_tilt_deg = 20.0",
+        "max_tilt_deg = 60.0",
+        "attitude.max_tilt",
+        "45",
     ),
     "a word in the stand": ("ground", "friction =", "friktion =", "stand.frik", "mean 'friction'"),
 }
@@ -471,3 +520,22 @@ def test_a_robot_that_takes_a_twist_has_motion_sensors_or_says_what_it_tells(tmp
     assert told.plant.odometry is None
     assert told.robot.motion.slip > measured.slip
     assert told.robot.motion.unlike_s > measured.unlike_s
+
+
+def test_what_pushes_every_way_takes_no_attitude():
+    table = robot_table(robot_path("ames"))
+    section = robot_table(robot_path("copter"))["attitude"]
+    link = table["link"] | {"takes": "attitude"}
+    with pytest.raises(RobotFileError, match=r"link\.takes: 'thrusts'"):
+        robot_of(table | {"attitude": section, "link": link}, "x")
+
+
+def test_how_a_copter_follows_is_in_si():
+    drive = load_robot("copter", takes=COMMANDS).robot.attitude
+    assert (drive.max_tilt, drive.yaw_rate) == pytest.approx((0.349066, 1.570796), abs=1e-6)
+    assert (drive.lag_s, drive.delay_s, drive.yaw_lag_s) == (0.15, 0.02, 0.1)
+
+
+def test_who_knows_thrusts_alone_is_not_given_a_copter():
+    with pytest.raises(RobotFileError, match="'attitude'; here only robots that take thrusts"):
+        load_robot("copter")

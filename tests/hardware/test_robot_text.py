@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from hardware.robot_file import ROBOTS, load_robot, robot_of, robot_table
+from hardware.robot_file import COMMANDS, ROBOTS, load_robot, robot_of, robot_table
 from hardware.robot_text import RobotTextError, with_gains, with_intervals, with_numbers
 from pipeline.gains import Gains
 from tests.hardware.identified_robots import identified, intervals_of, robot_text
@@ -161,7 +161,7 @@ def test_a_new_set_stands_behind_the_others_and_nothing_else_changes(path, tmp_p
     end = written.index("0.125]\n", start) + len("0.125]\n")
     assert written[: start - 1] + written[end:] == text
     (tmp_path / "mine.toml").write_text(written, encoding="utf-8")
-    robot_file = load_robot(tmp_path / "mine.toml")
+    robot_file = load_robot(tmp_path / "mine.toml", takes=COMMANDS)
     np.testing.assert_array_equal(robot_file.gains["late"].Ki, GAINS.Ki)
     assert list(robot_file.gains)[-1] == "late"
 

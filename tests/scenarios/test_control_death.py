@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hardware.follower import FollowerState
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from pipeline.config import TeleopConfig
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.slow
 
 def flown(name: str, seed: int, seconds: float) -> VirtualTimeSimulation:
     """A robot that is led, until control dies."""
-    robot_file = load_robot(name)
+    robot_file = load_robot(name, takes=COMMANDS)
     config = TeleopConfig(gains=robot_file.gains["phone"])
     loop = VirtualTimeSimulation(
         robot_file, config, SimulationOptions(hand="moving", seed=seed, led_noise_px=0.3)
@@ -31,6 +31,8 @@ def flown(name: str, seed: int, seconds: float) -> VirtualTimeSimulation:
     [
         ("quadrotor", 2, 9.4, 15.0, 0.5),
         ("quadrotor", 4, 10.8, 15.0, 0.5),
+        ("copter", 2, 9.4, 15.0, 0.5),
+        ("copter", 4, 10.8, 15.0, 0.5),
         ("ames", 0, 8.0, 9.0, 0.19),
     ],
 )
@@ -40,7 +42,7 @@ def test_the_robot_stays_upright_and_near(
     loop = flown(name, seed, seconds)
     follower, states = loop.follower, []
     start = follower.plant.p_bf_in_f
-    ramp_s = load_robot(name).robot.ramp_s
+    ramp_s = load_robot(name, takes=COMMANDS).robot.ramp_s
     while not states or states[-1] != FollowerState.REFUSING:
         follower.advance()
         plant = follower.plant

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
@@ -19,6 +19,7 @@ from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulat
 
 pytestmark = pytest.mark.slow
 QUADROTOR, GROUND = load_robot("quadrotor"), load_robot("ground")
+COPTER = load_robot("copter", takes=COMMANDS)
 TAKEN_OFF_S = 7.0
 """The hand has been lifted, and the integral has learnt the weight."""
 
@@ -28,7 +29,7 @@ RAYS_PX = 0.05
 
 
 def loop_of(name: str, hand: str, led_noise_px: float | None = None) -> VirtualTimeSimulation:
-    robot_file = {"quadrotor": QUADROTOR, "ground": GROUND}[name]
+    robot_file = {"quadrotor": QUADROTOR, "copter": COPTER, "ground": GROUND}[name]
     config = TeleopConfig(gains=robot_file.gains["phone"])
     options = SimulationOptions(hand=hand, seed=5, codec="jpeg", led_noise_px=led_noise_px)
     return VirtualTimeSimulation(robot_file, config, options)
@@ -43,13 +44,15 @@ def rms(rows: list[Array]) -> Array:
     return values
 
 
+@pytest.mark.parametrize("name", ["quadrotor", "copter"])
 @pytest.mark.parametrize(
     ("hand", "bound_mm"), [("moving", (20.0, 20.0, 13.0)), ("demo", (12.0, 12.0, 13.0))]
 )
-def test_the_quadrotor_takes_off_and_follows_in_x_y_z_and_yaw(
-    hand: str, bound_mm: tuple[float, ...]
+def test_a_quadrotor_takes_off_and_follows_in_x_y_z_and_yaw(
+    name: str, hand: str, bound_mm: tuple[float, ...]
 ) -> None:
-    loop, tilts = loop_of("quadrotor", hand), []
+    """Told thrusts, or attitude and thrust."""
+    loop, tilts = loop_of(name, hand), []
     while loop.t < 22.0 and not loop.trace.left:
         loop.advance()
         tilts.append(tilt_deg(loop))
@@ -140,11 +143,12 @@ def test_a_quadrotor_whose_thrusters_give_more_than_they_are_told_does_not_rise_
     assert highest < began + 0.15
 
 
+@pytest.mark.parametrize("name", ["quadrotor", "copter"])
 @pytest.mark.parametrize("lose", LOSSES, ids=WHICH)
 def test_a_quadrotor_that_loses_what_leads_it_lands_upright_nearby(
-    lose: Callable[[VirtualTimeSimulation], None],
+    lose: Callable[[VirtualTimeSimulation], None], name: str
 ) -> None:
-    places = np.array(after_a_loss("quadrotor", lose, 10.0))
+    places = np.array(after_a_loss(name, lose, 10.0))
     assert places[0, 2] > 0.3
     assert abs(places[-1, 2]) < 2e-3
     # 3 s of HOLD on the gyroscope alone: a degree of tilt makes a metre

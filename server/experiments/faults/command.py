@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
-from hardware.robot_file import RobotFile, load_robot
+from hardware.robot_file import BY_GAINS, RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
 from server.common.ranges import whole
 from server.common.text import Column, dashed
@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     """Let every fault happen to flights of many seeds."""
     if arguments.live:
         return run_live(arguments)
-    robot_file = load_robot(arguments.robot)
+    robot_file = load_robot(arguments.robot, takes=BY_GAINS)
     config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
     faults = named(FAULTS, arguments.only)
     outcomes = _outcomes(robot_file, config, faults, arguments)

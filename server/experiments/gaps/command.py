@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from hardware.robot_file import RobotFile, load_robot
+from hardware.robot_file import BY_GAINS, RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
 from server.common.ranges import number, whole
 from server.common.text import Column, dashed
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
         arguments.seeds, arguments.seconds = 1, min(arguments.seconds, 20.0)
         arguments.gap_ms, arguments.every_s = [160.0, 250.0, 400.0], [5.0]
         arguments.vanish = min(arguments.vanish, 40)
-    robot_file = load_robot(arguments.robot)
+    robot_file = load_robot(arguments.robot, takes=BY_GAINS)
     config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
     jobs = [
         GapJob(robot_file, config, case, seed, MINUTE_S if case.minute else arguments.seconds)

@@ -18,7 +18,7 @@ from hardware.follower import Follower, ThrustCommand
 from pipeline.frames import triple
 from pipeline.signals import BodyImu, Mode
 from server.control import realtime
-from server.control.controller import THRUST_DECIMALS, TIME_DECIMALS
+from server.control.controller import COMMAND_DECIMALS, TIME_DECIMALS
 from server.control.ipc import BodyRow, ControlStatus
 from server.control.process import STATUS_EVERY
 from server.control.robot_clock import RobotLink
@@ -82,7 +82,7 @@ class _Told:
         for one in body:
             self._body.append((one.t, *triple(one.omega_m_bf_in_b), *triple(one.a_m_bf_in_b)))
             self._t_body = one.t
-        thrusts = np.round(command.thrusts, THRUST_DECIMALS).tolist()
+        thrusts = np.round(command.thrusts, COMMAND_DECIMALS).tolist()
         self._commands.append((round(now, TIME_DECIMALS), *thrusts))
 
     def status(self, now: float, stand: PulseProgramme, command: ThrustCommand) -> ControlStatus:

@@ -63,6 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
     robot_file = load_robot(arguments.robot) if arguments.robot else recordings[0].robot
     if robot_file.robot.twist is not None:
         raise IdentificationError("this robot takes a twist: it has no thrusters to identify")
+    if robot_file.robot.attitude is not None:
+        raise IdentificationError("this robot takes an attitude: its thrusters are untold")
     if robot_file.plant.stand is not None and not robot_file.robot.weight_to_carry:
         raise IdentificationError("this robot stands: its friction is not in the model")
     flights = [flight for one in recordings for flight in flights_of(_states(one))]

@@ -111,7 +111,7 @@ def _kind(*, asks: bool) -> str:
     if not asks:
         raise RobotTextError("--kind", f"missing; allowed: {', '.join(KINDS)}")
     for kind, one in KINDS.items():
-        print(f"  {kind:<7} {one.words}")
+        print(f"  {kind:<8} {one.words}")
     while (said := input("What is it? ").strip()) not in KINDS:
         print(f"  allowed: {', '.join(KINDS)}")
     return said

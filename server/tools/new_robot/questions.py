@@ -81,7 +81,9 @@ def _f_min(file: Table, _: Table) -> Value:
 
 
 def _rise(file: Table, _: Table) -> Value:
-    return round(float(0.6 * file["thrusters"]["f_max_n"]), 3)
+    """Of each thruster, or of all together of a robot that is told nothing else."""
+    together = len(file["thrusters"]["units"]) if "attitude" in file else 1
+    return round(float(0.6 * file["thrusters"]["f_max_n"] * together), 3)
 
 
 MASS = Question("body.mass_kg", "mass, all on board", "kg", _same("body.mass_kg"), "the template's")
@@ -153,12 +155,27 @@ DRIVE = tuple(
         ("delay_s", "from a command to its beginning", "s"),
     )
 )
+AUTOPILOT = tuple(
+    Question(f"attitude.{name}", words, unit, _same(f"attitude.{name}"), "the template's")
+    for name, words, unit in (
+        ("max_tilt_deg", "it may be told to lean", "°"),
+        ("yaw_rate_deg_s", "largest yaw rate", "°/s"),
+        ("lag_s", "from a lean told to the body's: one over its attitude gain", "s"),
+        ("delay_s", "from a command to its beginning", "s"),
+        ("yaw_lag_s", "time constant of a yaw rate", "s"),
+    )
+)
 KINDS: Final[Mapping[str, RobotKind]] = {
     "hangs": RobotKind(
         "thrusters on an elastic suspension", "ames", (MASS, *CABLE, *THRUSTERS, INERTIA)
     ),
     "flies": RobotKind(
         "flies freely, stands on its legs", "quadrotor", (MASS, *THRUSTERS, INERTIA)
+    ),
+    "attitude": RobotKind(
+        "flies by an autopilot that takes attitude and thrust",
+        "copter",
+        (MASS, *THRUSTERS, INERTIA, *AUTOPILOT),
     ),
     "stands": RobotKind(
         "glides over a floor by its thrusters", "ground", (MASS, *THRUSTERS, *FEET, INERTIA)

@@ -21,6 +21,7 @@ import numpy as np
 from hardware.gain_check import bodies_words, controlled, loop_of
 from hardware.gain_tuning import TuningError, tuned
 from hardware.robot_file import (
+    BY_GAINS,
     RobotFile,
     RobotFileError,
     is_shipped,
@@ -75,7 +76,7 @@ def _tuned(arguments: argparse.Namespace) -> str:
     """Find, tell, fly, write; where it is."""
     path = robot_path(arguments.robot)
     target = _target(path, arguments)
-    robot_file = load_robot(path)
+    robot_file = load_robot(path, takes=BY_GAINS)
     content = path.read_bytes().decode("utf-8")  # line ends as they are
     base = _base(robot_file, arguments.base)
     name, comment = arguments.name or f"tuned_{arguments.latency_ms:.0f}ms", _comment(arguments)

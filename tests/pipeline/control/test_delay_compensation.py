@@ -104,8 +104,9 @@ def test_the_lean_of_a_quadrotor_diverges_beyond_its_delay_margin_alone() -> Non
             nonlocal wrench
             R_fb, omega_in_b = exp(np.array([angle, 0.0, 0.0])), np.array([rate, 0.0, 0.0])
             compensation.observe(omega_in_b, thrusters.follow(wrench, H)[3:], H)
-            wanted_in_b = np.concatenate((R_fb.T @ up_in_f, STILL))
-            wrench = tilt.wrench(wanted_in_b, R_fb, *compensation.body(omega_in_b))
+            force_in_b = tilt.force_in_b(R_fb.T @ up_in_f, R_fb)
+            torque_in_b = tilt.torque_in_b(force_in_b, *compensation.body(omega_in_b))
+            wrench = np.array([0.0, 0.0, max(force_in_b[2], 0.0), *torque_in_b, 0.0])
             return float(wrench[ROLL])
 
         return one_axis.grows(body, ROLL, late, control)

@@ -132,7 +132,7 @@ def test_a_weakened_robot_is_told_more_and_gives_what_is_wanted() -> None:
     gains[3] = 0.6
     actuation.weaken(gains)
     wanted = np.array([1.0, 0.5, -0.5, 0.1, -0.1, 0.1])
-    given = actuation.give(wanted, np.eye(3), STILL, STILL)
+    given = actuation.give(wanted, np.eye(3), STILL, STILL, 0.005)
     np.testing.assert_allclose(AMES.A @ (gains * given.thrusts), wanted, atol=1e-4)
     assert not given.saturated
 
@@ -144,7 +144,7 @@ def test_without_a_thruster_torques_are_given_before_forces() -> None:
         for sign in (1.0, -1.0):
             wanted = np.zeros(6)
             wanted[axis] = 0.3 * sign
-            missing = actuation.give(wanted, np.eye(3), STILL, STILL).missing_in_b
+            missing = actuation.give(wanted, np.eye(3), STILL, STILL, 0.005).missing_in_b
             assert np.abs(missing[3:]).max() < 0.03
 
 

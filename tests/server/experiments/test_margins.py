@@ -80,3 +80,13 @@ def test_it_draws_and_writes_the_figures(tmp_path: Path) -> None:
     assert all(row["delay_ms"] > 0.0 for row in figures["margins"] if not row["state"])
     assert all("response" not in row for row in figures["margins"])
     assert figures["arming"][0] == "arming with phone, relative: yes"
+
+
+def test_of_one_that_keeps_its_attitude_by_itself_no_loop_of_ours_turns_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["margins", "copter", "--estimator", "relative"]) == 0
+    told = capsys.readouterr().out
+    rows = [line.split() for line in told.splitlines() if line.split()[:1] == ["phone"]]
+    assert [row[2] for row in rows] == ["x", "y", "z", "yaw"]
+    assert [row[-1] for row in rows] == ["yes"] * 4

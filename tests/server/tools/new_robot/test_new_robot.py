@@ -66,7 +66,7 @@ def test_at_a_terminal_each_question_is_asked_and_a_word_is_asked_again(
     code, file = new(tmp_path)
     said = capsys.readouterr().out
     assert code == 0
-    assert "allowed: hangs, flies, stands, twist" in said
+    assert "allowed: hangs, flies, attitude, stands, twist" in said
     assert "allowed: 1 number, or nothing" in said
     assert load_robot(file).plant.mass == 4.2
 
@@ -74,7 +74,7 @@ def test_at_a_terminal_each_question_is_asked_and_a_word_is_asked_again(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ((), "--kind: missing; allowed: hangs, flies, stands, twist"),
+        ((), "--kind: missing; allowed: hangs, flies, attitude, stands, twist"),
         (("--kind", "hangs", "--name", "Ä"), "up to 32 of a-z"),
         (("--kind", "hangs", "--body.mass_kg", "0.001"), "body.mass_kg"),
         (("--kind", "hangs", "--suspension.length_m", "0"), "suspension.length_m"),
