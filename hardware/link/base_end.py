@@ -33,6 +33,7 @@ from hardware.follower import NOT_MEASURED, BodySample, Refusal, RobotCommand
 from hardware.link.gate_here import GateHere
 from hardware.link.stamp_clock import StampClock
 from hardware.pose_setpoint import BasePose
+from hardware.presumed_thrusts import PresumedThrusts
 from hardware.presumed_twist import PresumedTwist
 from hardware.robot_file import RobotFile
 from pipeline.frames import Array, Triple, triple
@@ -114,7 +115,7 @@ class FirstWriter(Generic[Writer]):
 
 
 class BaseEnd:
-    """Turns commands into twists, and messages of a base into samples. Times are [s], monotonic."""
+    """Turns commands into set-points, messages of a base into samples. Times are [s], monotonic."""
 
     def __init__(
         self,
@@ -131,8 +132,7 @@ class BaseEnd:
         without a pose is none.
         """
         drive = robot_file.robot.twist
-        assert drive is not None  # it takes a twist
-        self._presumed = PresumedTwist(drive)
+        self._presumed = PresumedTwist(drive) if drive else PresumedThrusts(robot_file.robot)
         self._gate, self._clock = GateHere(robot_file, epoch), StampClock()
         self._R_bi, self._has_odometry, self._says_where = R_bi, has_odometry, says_where
         self.pose: BasePose | None = None
@@ -164,7 +164,7 @@ class BaseEnd:
         self._dropped += 1
 
     def command(self, command: RobotCommand, now: float) -> Array:
-        """The twist (6,) in b [m/s, rad/s] that the base is to be told.
+        """What the base is to be told: a twist (6,) in b [m/s, rad/s], or attitude and thrust (4,).
 
         Raises:
             FollowerError: a command no robot may be told.

@@ -6,6 +6,10 @@ autopilot, until it has been silent for a second. What others say is dropped.
 
 * With each command of control a set-point goes out, velocity and yaw rate, zero, too: PX4 takes no
   OFFBOARD without, and either autopilot stops by itself a while after the last one.
+* One that takes attitude and thrust is told these instead, but nothing at all while its motors run
+  and it does not follow, or may not: zero there is a fall, silence is a switch to OFFBOARD that PX4
+  refuses, or the autopilot's own way down. Its attitude comes by ATTITUDE, its samples by
+  HIGHRES_IMU.
 * We never arm and never change its mode: that is its pilot's switch. While it is not armed, or not
   in the mode that follows, or has not said so for three seconds, it is told zero, with the reason
   for who leads; after that zero for half a second before anything else.
@@ -24,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from hardware.follower import BodySample, RobotCommand, RobotHealth
+from hardware.follower import BodySample, Refusal, RobotCommand, RobotHealth
 from hardware.link.address import ANYBODY
 from hardware.link.base_end import BaseEnd, FirstWriter, HeardImu, HeardOdometry
 from hardware.link.mavlink import messages as mav
@@ -32,6 +36,7 @@ from hardware.link.mavlink.axes import (
     R_ab,
     R_na_from_rpy,
     R_na_from_wxyz,
+    attitude_in_n,
     in_b,
     pose_in_n,
     told_in_h,
@@ -64,6 +69,8 @@ ALIVE = (
 )
 UNKNOWN_TWIST = (nan,) * 6
 UNKNOWN_COVARIANCE = (nan,) * 21
+HEADING_LASTS_S = 0.5
+"""With an older attitude nothing is known of its heading, by which it is told where to lean."""
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 """What the mask of a set-point takes out."""
 
@@ -75,14 +82,16 @@ class AutopilotEnd:
         self, robot_file: RobotFile, host: str, names: MavlinkParameters, epoch: int
     ) -> None:
         """Of a robot at the address `host`, or `ANYBODY`; nothing said, nothing heard."""
-        self._base = BaseEnd(robot_file, epoch, R_ab.T, has_odometry=True)
+        robot = robot_file.robot
+        self._leans, self._takes_thrust = robot.attitude is not None, _per_newton(robot_file, names)
+        self._base = BaseEnd(robot_file, epoch, R_ab.T, has_odometry=not self._leans)
         self._names, self._host = names, host
         self._autopilot = FirstWriter[Peer]()
         self._pilot, self._sync = Pilot(), TimeSync()
         self._boot_id = self._base.boot_id
         """Of the start whose clock `_sync` relates to ours."""
         self._R_na, self._omega_in_a = np.eye(3), np.zeros(3)
-        self._attitude_us = -ATTITUDE_LASTS_US
+        self._attitude_us, self._attitude_at = -ATTITUDE_LASTS_US, -np.inf
         self._sequence = self._dropped = 0
         self._alive_at = self._asked_at = -np.inf
         self._answers: list[bytes] = []
@@ -93,13 +102,14 @@ class AutopilotEnd:
             mav.SYS_STATUS: self._hear_status,
             mav.TIMESYNC: self._hear_time,
         }
-        if robot_file.robot.motion is None:
+        if robot.motion is None:
             self._hears[mav.HIGHRES_IMU] = self._hear_imu
-        if names.twist_from == "ODOMETRY":
+        if names.twist_from == "ODOMETRY" and not self._leans:
             self._hears[mav.ODOMETRY] = self._hear_odometry
         else:
             self._hears[mav.ATTITUDE] = self._hear_angles
             self._hears[mav.ATTITUDE_QUATERNION] = self._hear_quaternion
+        if names.twist_from == "LOCAL_POSITION_NED" and not self._leans:
             self._hears[mav.LOCAL_POSITION_NED] = self._hear_velocity
 
     @property
@@ -127,9 +137,10 @@ class AutopilotEnd:
         Raises:
             FollowerError: a command no robot may be told.
         """
-        self._base.hold(self._pilot.why_not(now))
+        why = self._why_not(now)
+        self._base.hold(why)
         told = self._base.command(command, now)
-        going = [self._set_point(told, now)]
+        going = [] if self._would_fall(why, now) else [self._set_point(told, now)]
         if now - self._alive_at >= ALIVE_EVERY_S:
             self._alive_at = now
             going.append(self._packet(mav.HEARTBEAT, *ALIVE))
@@ -176,6 +187,16 @@ class AutopilotEnd:
         """A sample of a robot without [body_imu], whenever control asks; see `BaseEnd.beat`."""
         return self._base.beat(now)
 
+    def _why_not(self, now: float) -> Refusal:
+        why = self._pilot.why_not(now)
+        if why == Refusal.NONE and self._leans and now - self._attitude_at > HEADING_LASTS_S:
+            return Refusal.SILENT
+        return why
+
+    def _would_fall(self, why: Refusal, now: float) -> bool:
+        """Whether a zero that is none of control's could be a thrust of zero in the air."""
+        return self._leans and why != Refusal.NONE and not self._pilot.keeps_it_off(now)
+
     def _hear(self, packet: MavlinkPacket | None, sender: Peer, now: float) -> BodySample | None:
         if packet is None:
             self._dropped += 1
@@ -204,21 +225,24 @@ class AutopilotEnd:
         else:
             self._answers.append(self._packet(mav.TIMESYNC, *self._sync.answer(asked_ns, now)))
 
-    def _hear_angles(self, values: tuple[float, ...], _now: float) -> None:
+    def _hear_angles(self, values: tuple[float, ...], now: float) -> None:
         at_ms, roll, pitch, yaw, *omega_in_a = values
         is_one = bool(np.isfinite((roll, pitch, yaw)).all())
         R_na = R_na_from_rpy(roll, pitch, yaw) if is_one else None
-        self._take_attitude(R_na, omega_in_a, US_PER_MS * int(at_ms))
+        self._take_attitude(R_na, omega_in_a, US_PER_MS * int(at_ms), now)
 
-    def _hear_quaternion(self, values: tuple[float, ...], _now: float) -> None:
+    def _hear_quaternion(self, values: tuple[float, ...], now: float) -> None:
         at_ms, w, x, y, z, *omega_in_a = values
-        self._take_attitude(R_na_from_wxyz((w, x, y, z)), omega_in_a, US_PER_MS * int(at_ms))
+        self._take_attitude(R_na_from_wxyz((w, x, y, z)), omega_in_a, US_PER_MS * int(at_ms), now)
 
-    def _take_attitude(self, R_na: Array | None, omega_in_a: Sequence[float], at_us: int) -> bool:
+    def _take_attitude(
+        self, R_na: Array | None, omega_in_a: Sequence[float], at_us: int, now: float
+    ) -> bool:
         if R_na is None:
             self._dropped += 1
             return False
-        self._R_na, self._omega_in_a, self._attitude_us = R_na, np.array(omega_in_a), at_us
+        self._R_na, self._omega_in_a = R_na, np.array(omega_in_a)
+        self._attitude_us, self._attitude_at = at_us, now
         return True
 
     def _hear_velocity(self, values: tuple[float, ...], now: float) -> None:
@@ -236,7 +260,7 @@ class AutopilotEnd:
         is_in_n = twist_frame == frame and frame in mav.FRAMES_OF_N
         if not (is_in_a or is_in_n):
             self._dropped += 1
-        elif self._take_attitude(R_na, values[mav.ODOMETRY_OMEGA], at_us):
+        elif self._take_attitude(R_na, values[mav.ODOMETRY_OMEGA], at_us, now):
             v = np.array(values[mav.ODOMETRY_V])
             self._take_velocity(v if is_in_a else self._R_na.T @ v, at_us, now)
 
@@ -257,7 +281,25 @@ class AutopilotEnd:
             self._boot_id, self._sync = self._base.boot_id, TimeSync()
         return self._sync.ours(1e-6 * at_us)
 
-    def _set_point(self, told_in_b: Array, now: float) -> bytes:
+    def _set_point(self, told: Array, now: float) -> bytes:
+        return self._attitude(told, now) if self._leans else self._velocity(told, now)
+
+    def _attitude(self, told: Array, now: float) -> bytes:
+        _, _, yaw_rate, thrust = told.tolist()
+        return self._packet(
+            mav.SET_ATTITUDE_TARGET,
+            round(US_PER_MS * now) % U32,
+            *attitude_in_n(told[:2], self._R_na),
+            0.0,
+            0.0,
+            -yaw_rate,
+            min(1.0, self._takes_thrust * thrust),
+            self._names.system,
+            self._names.component,
+            mav.ATTITUDE_YAW_RATE_AND_THRUST,
+        )
+
+    def _velocity(self, told_in_b: Array, now: float) -> bytes:
         v_in_h, yaw_rate = told_in_h(told_in_b, self._R_na)
         return self._packet(
             mav.SET_POSITION_TARGET_LOCAL_NED,
@@ -277,3 +319,12 @@ class AutopilotEnd:
         self._sequence += 1
         sender = self._names.system, self._names.own_component
         return encoded(MavlinkPacket(*sender, message, values), self._sequence)
+
+
+def _per_newton(robot_file: RobotFile, names: MavlinkParameters) -> float:
+    """Of an autopilot's thrust, 0 to 1 [1/N]."""
+    robot = robot_file.robot
+    if names.hover_thrust is not None:
+        return names.hover_thrust / robot.weight_to_carry
+    most = robot.A.shape[1] * robot.f_max
+    return 1.0 / most if most > 0.0 else 0.0

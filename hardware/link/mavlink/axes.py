@@ -63,6 +63,15 @@ def pose_in_n(seen: StandingPose) -> tuple[Triple, tuple[float, ...], tuple[floa
     return triple(R_ab @ seen.p_bs_in_s), wxyz, tuple(covariance[np.triu_indices(6)].tolist())
 
 
+def attitude_in_n(lean: Array, R_na: Array) -> tuple[float, ...]:
+    """Quaternion w, x, y, z of an attitude with roll and pitch (2,) [rad] in our axes.
+
+    Of the heading that the autopilot says it has: it is told how fast to turn beside.
+    """
+    _, _, yaw = rpy_from_R(R_na)
+    return wxyz_from_R(R_from_rpy(np.array([lean[0], -lean[1], yaw])))
+
+
 def told_in_h(twist_in_b: Array, R_na: Array) -> tuple[Triple, float]:
     """Velocity [m/s] and yaw rate [rad/s] that an autopilot of that attitude is told for a twist.
 

@@ -2,7 +2,8 @@
 
 We listen on a port, as autopilots, routers and simulators expect of who commands them, and answer
 where the autopilot was heard. Its own time-out stops it when nothing comes any more, so a robot is
-armed only if its file says so (`stopped_by`); given back, the link's last words are zeros.
+armed only if its file says so (`stopped_by`); given back, the link's last words are zeros to one
+that takes a twist.
 """
 
 from __future__ import annotations
@@ -29,8 +30,6 @@ MOST_BYTES = 2048
 class MavlinkFollower(LinkFollower[AutopilotEnd]):
     """An autopilot that speaks to a port of ours."""
 
-    thrusters = 0
-
     def __init__(
         self,
         address: Peer,
@@ -38,6 +37,7 @@ class MavlinkFollower(LinkFollower[AutopilotEnd]):
         clock: Callable[[], float] = time.monotonic,
         *,
         wants_vision: bool = False,
+        thrusters: int = 0,
     ) -> None:
         """Listens at `address`; says nothing before it has heard something.
 
@@ -45,6 +45,7 @@ class MavlinkFollower(LinkFollower[AutopilotEnd]):
             FollowerError: somebody else listens there.
         """
         super().__init__(end, clock)
+        self.thrusters = thrusters
         self.wants_vision = wants_vision
         """See `TakesVision`."""
         try:
@@ -87,9 +88,10 @@ class MavlinkFollower(LinkFollower[AutopilotEnd]):
     def close(self) -> None:
         """Close. See `Follower`.
 
-        Not without a word: an autopilot holds itself, and nobody falls by zero.
+        Not without a word, but to one that takes attitude and thrust: others hover by zero.
         """
-        self.stop()
+        if not self.thrusters:
+            self.stop()
         self._closed = True
         self._socket.close()
 
@@ -121,7 +123,12 @@ def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> MavlinkFollower:
     host = address_of(link.host, "whoever speaks first")
     here = host if host.startswith("127.") else ANYBODY
     end = AutopilotEnd(robot_file, host, link.mavlink, epoch)
-    return MavlinkFollower((here, link.port), end, wants_vision=link.mavlink.vision)
+    return MavlinkFollower(
+        (here, link.port),
+        end,
+        wants_vision=link.mavlink.vision,
+        thrusters=robot_file.robot.A.shape[1],
+    )
 
 
-KIND = LinkKind(connect, stops_in_silence=False, keyed=False, takes=("twist",))
+KIND = LinkKind(connect, stops_in_silence=False, keyed=False, takes=("twist", "attitude"))

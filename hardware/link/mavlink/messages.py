@@ -1,4 +1,4 @@
-"""The nine messages of MAVLink that lead an autopilot, by the layouts of its `common` dialect.
+"""The ten messages of MAVLink that lead an autopilot, by the layouts of its `common` dialect.
 
 Fields go by their sizes, the largest first, as on the wire; those behind `least` came later, and
 who doesn't know them leaves them out.
@@ -12,6 +12,8 @@ who doesn't know them leaves them out.
 | LOCAL_POSITION_NED            | time [ms]; place, velocity                                       |
 | SET_POSITION_TARGET_LOCAL_NED | time [ms]; place, velocity, acceleration, yaw and its rate;      |
 |                               | mask; system, component, frame                                   |
+| SET_ATTITUDE_TARGET           | time [ms]; w, x, y, z, three rates, thrust; system, component,   |
+|                               | mask                                                             |
 | HIGHRES_IMU                   | time [µs]; accelerometer, gyroscope, magnetometer, two           |
 |                               | pressures, height, temperature; which of them are new            |
 | TIMESYNC                      | by the clock of who answers [ns], of who asked [ns]              |
@@ -29,6 +31,7 @@ SYS_STATUS = 1
 ATTITUDE = 30
 ATTITUDE_QUATERNION = 31
 LOCAL_POSITION_NED = 32
+SET_ATTITUDE_TARGET = 82
 SET_POSITION_TARGET_LOCAL_NED = 84
 HIGHRES_IMU = 105
 TIMESYNC = 111
@@ -50,6 +53,8 @@ FRAMES_OF_N = MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_FRD
 """What stands, z down."""
 VELOCITY_AND_YAW_RATE = 0b0101_1100_0111
 """POSITION_TARGET_TYPEMASK: place, acceleration and yaw are to be ignored."""
+ATTITUDE_YAW_RATE_AND_THRUST = 0b0000_0011
+"""ATTITUDE_TARGET_TYPEMASK: roll and pitch rates are to be ignored."""
 UNKNOWN_MV = 0xFFFF
 """A battery's voltage that nobody measures."""
 
@@ -84,6 +89,7 @@ LAYOUTS = {
     ATTITUDE_QUATERNION: _layout("I7f", 246),
     LOCAL_POSITION_NED: _layout("I6f", 185),
     SET_POSITION_TARGET_LOCAL_NED: _layout("I11fH3B", 143),
+    SET_ATTITUDE_TARGET: _layout("I8f3B", 49),
     HIGHRES_IMU: _layout("Q13fH", 93),
     TIMESYNC: _layout("2q", 34),
     ODOMETRY: _layout("Q55f2B", 91, "2Bb"),

@@ -39,6 +39,10 @@ class Pilot:
             return Refusal.MODE
         return Refusal.NONE if self._armed else Refusal.NOT_ARMED
 
+    def keeps_it_off(self, now: float) -> bool:
+        """Whether the motors are known to stand."""
+        return not self._armed and now - self._heard_at <= LASTS_S
+
 
 def _follows(custom_mode: int, kind: int, autopilot: int) -> bool:
     if autopilot == PX4:

@@ -66,11 +66,11 @@ def test_a_mistake_is_named_by_its_key(mistake):
 
 def test_its_kind_comes_by_the_entry_point_that_other_packages_use():
     assert link_kind("mavlink") is KIND
-    assert (KIND.stops_in_silence, KIND.keyed, KIND.takes) == (False, False, ("twist",))
+    assert (KIND.stops_in_silence, KIND.keyed, KIND.takes) == (False, False, ("twist", "attitude"))
 
 
 def test_a_robot_that_takes_thrusts_is_refused_before_anything_is_sent():
-    with pytest.raises(FollowerError, match=r"takes = 'thrusts'.*twist by this one"):
+    with pytest.raises(FollowerError, match=r"takes = 'thrusts'.*twist or attitude by this one"):
         connect(load_robot("ames").reached("127.0.0.1", 1, "mavlink"), KEY, 1)
 
 
