@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 from pathlib import Path
 
 from server.cli import COMMANDS
@@ -101,3 +102,11 @@ def test_the_readme_s_table_of_commands_is_the_command_line_s() -> None:
     after = words[words.index("experiments loop") :]
     flown = [word.removeprefix("experiments ") for word in after]
     assert sorted(flown) == sorted(EXPERIMENTS)
+
+
+def test_the_readme_s_table_of_folders_is_the_tree_s() -> None:
+    table = (ROOT / "README.md").read_text().split("| folder |")[1].split("\n\n")[0]
+    told = set(re.findall(r"^\| `([a-z_]+)/` \|", table, re.MULTILINE))
+    files = subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).splitlines()
+    tops = {file.split("/")[0].strip('"') for file in files if "/" in file}
+    assert {top for top in tops if not top.startswith(".")} == told

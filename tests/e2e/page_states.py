@@ -5,7 +5,8 @@ python -m tests.e2e.page_states folder [en | fr]
 
 from __future__ import annotations
 
-import sys
+import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from playwright.sync_api import BrowserContext, Page
@@ -15,6 +16,7 @@ from tests.e2e.written_pages import FRENCH, opened, written_pages
 
 PHONES = ((360, 640), (412, 915), (915, 412), (667, 375))
 TABLET, DESKTOP, LAPTOP = (820, 1180), (1280, 720), (1440, 900)
+LANGUAGES = ("en", "fr")
 LETTERS_PX = (16, 32)
 """The usual size, and 200 % of it."""
 
@@ -243,10 +245,14 @@ def shown(
     return page
 
 
-def main() -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """A picture of each state, at each size of screen and of letters, in one language or in all."""
-    target, executable = Path(sys.argv[1]), wanted_chromium()
-    languages = sys.argv[2:] or ["en", "fr"]
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("folder", type=Path, help="for the pictures")
+    parser.add_argument("language", nargs="?", choices=LANGUAGES, help="default: each")
+    arguments = parser.parse_args(argv)
+    target, executable = arguments.folder, wanted_chromium()
+    languages = [arguments.language] if arguments.language else LANGUAGES
     target.mkdir(parents=True, exist_ok=True)
     for px in LETTERS_PX:
         with written_pages(executable, letters(px)) as context:
