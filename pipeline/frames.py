@@ -19,13 +19,16 @@ Triple = tuple[float, float, float]
 GRAVITY = 9.80665
 """Standard gravity [m/s²]; ^f g = (0, 0, -GRAVITY)."""
 
+UP: Array = np.array([0.0, 0.0, 1.0])
+"""In f, and in b while the robot is level."""
+
 R_co: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """OpenCV optical axes in camera axes: z forward → x, x right → −y, y down → −z."""
 
 R_cd_portrait: Array = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """W3C device axes in camera axes: rear camera, phone upright in its natural orientation."""
 
-for _constant in (R_co, R_cd_portrait):
+for _constant in (UP, R_co, R_cd_portrait):
     _constant.setflags(write=False)
 
 

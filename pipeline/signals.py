@@ -118,6 +118,16 @@ class RelativePose:
     leds: int
     """How many LEDs it rests on."""
 
+    @property
+    def sigma_p(self) -> float:
+        """Largest standard deviation of the position [m]."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.covariance[:3, :3])[-1]))
+
+    @property
+    def sigma_theta(self) -> float:
+        """Largest standard deviation of the attitude [rad]."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.covariance[3:, 3:])[-1]))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LedRays:
@@ -218,6 +228,12 @@ class VirtualView:
     """(3,) [rad/s]."""
     guarding: float = 0.0
     """0 to 1: how much v hurries after c, to keep the robot in the picture."""
+
+    @property
+    def R_fb(self) -> Array:
+        """(3, 3) attitude of the robot."""
+        R_fb: Array = self.R_fv @ self.R_vb
+        return R_fb
 
 
 class Mode(IntEnum):

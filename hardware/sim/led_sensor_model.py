@@ -21,6 +21,8 @@ from pipeline.vision.rays import rays_of
 
 LEAST_NOISE_PX = 0.01
 """Nobody claims to know a spot's place better."""
+LED_NOISE_PX = 0.02
+"""As vision's of rendered pictures."""
 MIN_LEDS = 4
 """For a pose from nothing else."""
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hardware.plant_parameters import BodyImuParameters
 from pipeline.config import PERIOD_S
-from pipeline.frames import GRAVITY, Array, R_between, exp, skew
+from pipeline.frames import GRAVITY, UP, Array, R_between, exp, skew
 
 REST_S: Final = 2.0
 """At the beginning; the gyroscope's mean there is its bias, to begin with."""
@@ -29,7 +29,6 @@ DRIFT_RAD_S: Final = 2e-4
 """By which the bias in the rest may be wrong."""
 ROUNDS: Final = 3
 """Of small angles: the next one corrects less than a thousandth of the one before."""
-UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

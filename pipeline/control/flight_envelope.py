@@ -66,7 +66,7 @@ def _outside(limits: EnvelopeConfig, error: PoseError, view: VirtualView) -> str
         return "Turned too far from where it should be."
     if float(view.omega_bf_in_b @ view.omega_bf_in_b) > limits.max_body_rate**2:
         return "The robot spins too fast."
-    if float((view.R_fv @ view.R_vb)[2, 2]) < cos(limits.max_tilt_rad):
+    if float(view.R_fb[2, 2]) < cos(limits.max_tilt_rad):
         return "The robot is tilted too far."
     return ""
 

@@ -110,7 +110,7 @@ class Pid:
         force_in_b = (
             Kp[:3] * (view.R_vb.T @ error.e_p_in_v)
             + Kd[:3] * (view.R_vb.T @ error.e_p_rate_in_v)
-            + self._axes[:3] * ((view.R_fv @ view.R_vb).T @ self.constant_force_in_f)
+            + self._axes[:3] * (view.R_fb.T @ self.constant_force_in_f)
         )
         torque_in_b = (
             Kp[3:] * error.e_eta_in_b + Kd[3:] * error.e_eta_rate_in_b + self._integral_torque_in_b
@@ -126,10 +126,9 @@ class Pid:
         self, error: PoseError, view: VirtualView, missing_wrench_in_b: Array, h: float
     ) -> None:
         """Carry the integrals on by `h`; `missing_wrench_in_b` (6,) is commanded minus achieved."""
-        R_fb = view.R_fv @ view.R_vb
         back = self._back * missing_wrench_in_b
         force_rate_in_b = self._Ki[:3] * (view.R_vb.T @ error.e_p_in_v) - back[:3]
-        self._integral_force_in_f = self._integral_force_in_f + h * (R_fb @ force_rate_in_b)
+        self._integral_force_in_f = self._integral_force_in_f + h * (view.R_fb @ force_rate_in_b)
         self._integral_torque_in_b = self._integral_torque_in_b + h * (
             self._Ki[3:] * error.e_eta_in_b - back[3:]
         )

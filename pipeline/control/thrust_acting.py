@@ -58,7 +58,7 @@ class ThrustActing:
         self._place = SuspendedPlace(robot)
         self._leash = leash_of(robot, config.leash, config.resumption)
         self._force_in_b = self._mean_force_in_f = np.zeros(3)
-        self._coasts = False
+        self._has_coasted = False
         self._told_in_b = np.zeros(6)
 
     @property
@@ -100,7 +100,7 @@ class ThrustActing:
         In a gap by the gyroscope alone: f is put right only after it.
         """
         self._tracking.observe(known, self._told_in_b, now.h)
-        R_fb = known.view.R_fv @ known.view.R_vb
+        R_fb = known.view.R_fb
         if now.is_deaf:
             self._station.reset()
             self._hold.R_fb = R_fb
@@ -108,7 +108,7 @@ class ThrustActing:
         if now.mode != Mode.COAST:
             self._take_up(R_fb)
         else:  # nothing of an estimate that may be in doubt, biases neither
-            self._coasts, R_fb = True, self._hold.R_fb
+            self._has_coasted, R_fb = True, self._hold.R_fb
             f_bf_in_b = self._hold.specific_force_in_b(now.body.a_m_bf_in_b)
         place, x_before_in_f = self._place, self._place.x_in_f
         place.propagate(f_bf_in_b, R_fb, self._told_in_b[:3], now.h, now.knows_vertical)
@@ -118,9 +118,9 @@ class ThrustActing:
 
     def _take_up(self, R_fb: Array) -> None:
         """After a gap f's axes are put right, or another phone's; what was kept goes along."""
-        if not self._coasts:
+        if not self._has_coasted:
             return
-        turn_of_f, self._coasts = R_fb @ self._hold.R_fb.T, False
+        turn_of_f, self._has_coasted = R_fb @ self._hold.R_fb.T, False
         self._station.turn(turn_of_f)
         self._place.turn(turn_of_f)
         self._mean_force_in_f = turn_of_f @ self._mean_force_in_f
@@ -152,7 +152,7 @@ class ThrustActing:
 
     def start(self, known: Situation, from_rest: bool) -> None:
         """Begin to track, from rest or from the force that was held."""
-        R_fb = known.view.R_fv @ known.view.R_vb
+        R_fb = known.view.R_fb
         self._take_up(R_fb)
         held_in_f = R_fb @ self._force_in_b
         self._tracking.start(None if from_rest else held_in_f)
@@ -163,7 +163,7 @@ class ThrustActing:
         """Bumpless: holding starts from what tracking did."""
         # hold and station take over from what tracking last gave, so before its integrals are reset
         if before == Mode.TRACK and known is not None:
-            R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
+            R_fb, u_in_f = known.view.R_fb, known.R_fc @ known.relative.u_bf_in_c
             constant_in_f = self._tracking.constant_force_in_f
             # in doubt where it should be it stays where it is; and integrated acceleration, whose
             # attitude is in doubt as well, is no place for one that its suspension carries
@@ -209,7 +209,7 @@ class ThrustActing:
         mode, reference = now.mode, now.reference
         omega_m_bf_in_b = now.body.omega_m_bf_in_b
         if mode == Mode.TRACK and known and reference and leashed:
-            R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
+            R_fb, omega_bf_in_b = known.view.R_fb, known.view.omega_bf_in_b
             turned_in_b, omega_in_b = self._tracking.body_ahead(omega_bf_in_b)
             self._actuation.learn(R_fb, now.h)
             shares_in_f = _shares_in_f(leashed, now.leading)

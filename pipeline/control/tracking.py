@@ -64,7 +64,7 @@ class Tracking:
 
         They were `told_in_b` (6,) [N, N m] since the last one.
         """
-        relative, R_fb = now.relative, now.view.R_fv @ now.view.R_vb
+        relative, R_fb = now.relative, now.view.R_fb
         told = np.concatenate((R_fb @ told_in_b[:3], told_in_b[3:]))
         impulse = self._thrusters.follow(told, h)
         self._ahead.observe(relative.f_bf_in_b, R_fb, self._thrusters.given[:3], h)
@@ -123,7 +123,7 @@ class Tracking:
         h: float,
     ) -> Array:
         """Yield where the force would be more than an obstacle is to bear."""
-        R_fb = now.view.R_fv @ now.view.R_vb
+        R_fb = now.view.R_fb
         a_bf_in_b = now.relative.f_bf_in_b + R_fb.T @ G_IN_F
         soft_in_f = compliance.force(
             R_fb @ wrench_in_b[:3],

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
+
+MAX_SLEEP_S: Final = 2.0
+"""If nobody asked for so long, what was known is forgotten; no sample comes from so far ahead."""
 
 
 class Fusion(Enum):

@@ -105,8 +105,8 @@ class NoFilter:
             omega_bf_in_b=self._omega_bc_in_b + pose.R_cb.T @ omega_c,
             omega_cf_in_c=omega_c,
             R_ic=np.eye(3),
-            sigma_p=_largest_sigma(pose.covariance[:3, :3]),
-            sigma_theta=_largest_sigma(pose.covariance[3:, 3:]),
+            sigma_p=pose.sigma_p,
+            sigma_theta=pose.sigma_theta,
             age=now - pose.t,
             f_cf_in_c=phone.a_m_cf_in_c,
             f_bf_in_b=pose.R_cb.T @ phone.a_m_cf_in_c if body is None else body.a_m_bf_in_b,
@@ -142,7 +142,3 @@ class NoFilter:
 
 def _is_sample(t: float, rate: Array, force: Array) -> bool:
     return rate.shape == force.shape == (3,) and are_finite(t, rate, force)
-
-
-def _largest_sigma(C: Array) -> float:
-    return float(np.sqrt(np.linalg.eigvalsh(C)[-1]))

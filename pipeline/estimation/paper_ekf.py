@@ -15,11 +15,10 @@ forgets everything, counts it, and starts again at the first picture away from i
 from __future__ import annotations
 
 from collections import Counter
-from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.estimator import Fusion, Health
+from pipeline.estimation.estimator import MAX_SLEEP_S, Fusion, Health
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.paper_ekf_kernels import MIN_COS_PITCH
 from pipeline.estimation.paper_ekf_replay import seen_pose
@@ -31,9 +30,6 @@ from pipeline.frames import Array, cross, rpy_from_R
 from pipeline.imu_stream import ImuStream
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
-
-MAX_SLEEP_S: Final = 2.0
-"""If nobody asked for so long, what was known is forgotten."""
 
 
 class PaperEkf:

@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
 from pipeline.estimation.aliased_tone import AliasedTone
 from pipeline.estimation.bias_steps import BiasSteps
-from pipeline.estimation.estimator import Fusion, Health
+from pipeline.estimation.estimator import MAX_SLEEP_S, Fusion, Health
 from pipeline.estimation.misdated_picture import STUMBLE_S, MisdatedPictures
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET, N, X
@@ -41,8 +41,6 @@ from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, Vis
 from pipeline.so3_kernels import largest_sigma
 from pipeline.timing.offset_watch import OffsetMonitor
 
-MAX_SLEEP_S: Final = 2.0
-"""If nobody asked for so long, what was known is forgotten; no sample comes from so far ahead."""
 DATED_S: Final = 0.005
 """While the pictures' time is known worse [s], a miss tells of it, not of the motion samples."""
 ONE_DATE_S: Final = 0.002

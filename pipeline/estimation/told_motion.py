@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimator_config import RelativeConfig
-from pipeline.frames import GRAVITY, Array, exp
+from pipeline.frames import GRAVITY, UP, Array, exp
 from pipeline.imu_stream import ImuStream
 from pipeline.robot import ToldMotion
 
@@ -44,7 +44,6 @@ BY_PHONE: Final = 0.5
 WANDERS: Final = 5e-3
 """Of that vertical, carried on by twists, beside what the noise of their turns makes [m/s²/√s]."""
 AVERAGED_S: Final = 0.1
-UP: Final = np.array([0.0, 0.0, 1.0])
 
 
 def for_body(config: RelativeConfig, motion: ToldMotion | None) -> RelativeConfig:

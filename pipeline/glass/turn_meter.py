@@ -19,11 +19,10 @@ import numpy as np
 from pipeline.frames import Array
 from pipeline.imu_stream import ImuStream
 from pipeline.signals import PhoneImu, RelativePose
+from pipeline.vision.steadied_picture import EVEN
 
 LONGEST_S: Final = 0.1
 """Between two pictures."""
-EVEN: Final = 0.25
-"""By so much of it the time between two pictures may differ from the time between those before."""
 KEPT: Final = 1800
 """Jumps: a minute's."""
 LEAST: Final = 60

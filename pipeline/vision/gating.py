@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from math import acos, degrees
+from typing import Final
 
 import numpy as np
 
 from pipeline.frames import Array
 from pipeline.signals import RelativePose
 from pipeline.vision_config import GatesConfig
+
+UNGATED: Final = 1e9
+"""χ² of an LED: what a pose or a candidate is held against must rest on all its LEDs."""
 
 
 def gate_rejection(

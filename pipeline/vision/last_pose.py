@@ -205,13 +205,8 @@ class LastPose:
 def _contradict(pose: RelativePose, expected: Prediction) -> bool:
     """Whether not both can be true."""
     shift, turn = pose.p_bc_in_c - expected.p_bc_in_c, log(expected.R_cb.T @ pose.R_cb)
-    sigma_p = np.hypot(expected.sigma_p, _largest(pose.covariance[:3, :3]))
-    sigma_theta = np.hypot(expected.sigma_theta, _largest(pose.covariance[3:, 3:]))
+    sigma_p = np.hypot(expected.sigma_p, pose.sigma_p)
+    sigma_theta = np.hypot(expected.sigma_theta, pose.sigma_theta)
     far_m = CONTRADICTION_SIGMAS * sigma_p + CONTRADICTION_M
     far_rad = CONTRADICTION_SIGMAS * sigma_theta + CONTRADICTION_RAD
     return not (shift @ shift < far_m**2 and turn @ turn < far_rad**2)
-
-
-def _largest(covariance: Array) -> float:
-    """Largest standard deviation along any axis."""
-    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))

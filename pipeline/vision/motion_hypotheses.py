@@ -23,9 +23,8 @@ from pipeline.frames import GRAVITY, Array, log
 from pipeline.imu_stream import MAX_GAP_S, ImuStream, ImuStreams
 from pipeline.signals import RelativePose, VisionMeasurement
 from pipeline.vision.blink_code import BlinkCode, BlinkReader
+from pipeline.vision.gating import UNGATED
 
-UNGATED: Final = 1e9
-"""χ² of an LED: what is held against a candidate must rest on all of it."""
 OFFSET_STILL: Final = 0.1
 """LEDs must move so fast [rad/s] before half is believed about the stamps' offset: while all rest,
 a gyroscope's noise would be taken for motion that comes too late."""

@@ -43,6 +43,7 @@ from pipeline.robot import ToldMotion
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
 from pipeline.vision.camera_lies import BACK, SHIFTED, CameraLie, is_far, named, scaled
 from pipeline.vision.check_noise import CheckNoise
+from pipeline.vision.gating import UNGATED
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.steadied_picture import SteadiedPicture
 
@@ -75,8 +76,6 @@ TRIAL_S: Final = 1.5
 """In the right so long, by pictures between which enough moved to show that they are."""
 FLOOR_RAD: Final = 2e-4
 """How far an LED may be from where picture and robot file have it, beside noise: 0.2 px."""
-UNGATED: Final = 1e9
-"""χ² of an LED: the pose rests on all that are handed on, and so must what is held against it."""
 KNOWN_S: Final = 1.5
 """After so long enough is known of the motion sensors to refuse a picture, and to be kept."""
 RETURNED: Final = 0.04

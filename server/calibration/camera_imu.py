@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 
 from hardware.camera_file import TIME_OFFSETS_S
 from pipeline.frames import Array, R_co, exp, log
+from server.calibration.motion import NEAR_S
 
-NEAR_S = 0.11
 OFFSETS_S = np.arange(*TIME_OFFSETS_S, 0.005)
 FEWEST_STEPS = 30
 FEWEST_SAMPLES = 20

@@ -14,12 +14,12 @@ import numpy as np
 
 from hardware.follower import BodySample, FollowerState, RobotCommand, TwistCommand
 from hardware.presumed_twist import PresumedTwist
-from pipeline.frames import GRAVITY, cross
+from pipeline.frames import GRAVITY, UP, cross
 from pipeline.robot import Robot, ToldMotion, TwistDrive
 from pipeline.signals import BodyImu
 
 UNTOLD = "The robot does not say for the moment how it moves."
-UP = np.array([0.0, 0.0, GRAVITY])
+AT_REST_IN_B = GRAVITY * UP
 APART_S = 1e-3
 """Two twists are measured farther apart: else it is the same, on a clock that is adjusted."""
 
@@ -54,7 +54,7 @@ class ToldBody:
         twist = self._presumed.at(t)
         v, omega, force = twist[:3], twist[3:], np.zeros(3)
         if self._motion.is_level:
-            force = UP + self._presumed.rate[:3] + cross(omega, v)
+            force = AT_REST_IN_B + self._presumed.rate[:3] + cross(omega, v)
         return BodyImu(t, omega, force, twist)
 
     def _measured(self, sample: BodySample, t: float) -> bool:

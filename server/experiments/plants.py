@@ -20,6 +20,7 @@ import numpy as np
 from hardware.plant_parameters import PlantParameters
 from hardware.robot_file import RobotFile, load_robot
 from hardware.sim.hand import make_hand
+from hardware.sim.led_sensor_model import LED_NOISE_PX
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from server.common.ranges import number, seed_number, whole
@@ -38,8 +39,6 @@ THRUST: Final = 0.15
 """... and what each thruster gives; above the largest thrust none gives more."""
 LAGS_S: Final = (0.015, 0.045)
 """Of a thruster: the range that the AMES's file gives for its own."""
-LED_NOISE_PX: Final = 0.02
-"""As vision's of rendered pictures."""
 FAILS_AT_S: Final = 6.0
 """A thruster, four seconds after tracking began ..."""
 AFTER_S: Final = 1.0

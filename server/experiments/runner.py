@@ -17,7 +17,7 @@ from server.media.plots import drawn
 
 MISSED: Final = 1
 REFUSED: Final = 2
-"""Exit codes."""
+"""Exit codes; the second of what can't run with these options, or not here."""
 Draw = Callable[[Path], Sequence[Path]]
 """Draws into a folder; gives the files."""
 

@@ -15,7 +15,7 @@ from server.common.clock import now
 from server.common.cluster.workers import local_cluster
 from server.common.errors import InputError
 from server.common.options import Parser
-from server.common.ranges import whole
+from server.common.ranges import number, whole
 from server.protocol.messages import Command, Status
 from server.protocol.wire_records import Picture, Pong, Record, Touch
 from server.recording.reader import Recording, before, device_of, read, recover
@@ -130,18 +130,13 @@ async def _send(replay: Replay, client: PhoneClient, played: Played) -> None:
         played.records += 1
 
 
-def _speed(text: str) -> float:
-    speed = float(text)
-    if not 0.05 <= speed <= 20.0:
-        raise argparse.ArgumentTypeError(f"{text}: allowed: 0.05 to 20")
-    return speed
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="lightleash replay", description=__doc__)
     several = "recording; with --scheduler several, or folders of them"
     parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help=several)
-    parser.add_argument("--speed", type=_speed, default=1.0, help="times as fast as recorded")
+    parser.add_argument(
+        "--speed", type=number(0.05, 20.0), default=1.0, help="times as fast as recorded"
+    )
     parser.add_argument("--offline", action="store_true", help="through the pipeline, no server")
     out = "CSV of what the pipeline saw, with --offline; folder of them, with --scheduler"
     parser.add_argument("--out", type=Path, help=f"{out} (default: {REPLAYS})")

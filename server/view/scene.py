@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.plant_parameters import PlantParameters, StartParameters
-from pipeline.frames import Array, R_co, R_from_wxyz, wxyz_from_R
+from pipeline.frames import UP, Array, R_co, R_from_wxyz, wxyz_from_R
 from pipeline.robot import Robot, TwistDrive
 from pipeline.signals import Mode
 from server.control.ipc import ControlStatus
@@ -24,7 +24,6 @@ Colour = tuple[int, int, int]
 Mesh = tuple[Array, npt.NDArray[np.uint32]]
 """Vertices (n, 3) [m] and faces (k, 3)."""
 
-UP = np.array([0.0, 0.0, 1.0])
 FLOOR_Z = -1.3
 """Of the grid [m]: about where the floor is under a phone held upright."""
 BACKGROUND: Colour = (20, 20, 20)

@@ -27,7 +27,7 @@ from server.common import clock
 from server.common.access import PhoneClientError, access_of, add_access_arguments
 from server.common.child import raise_niceness, set_oom_score
 from server.common.options import Parser
-from server.common.ranges import MOST_PORT, whole
+from server.common.ranges import MOST_PORT, number, whole
 from server.virtual_phone.live_phone import EXPOSED_S, LivePhone, MakeClient
 from server.virtual_phone.phone_client import PhoneClient
 from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
@@ -125,13 +125,6 @@ def _latency(text: str) -> tuple[float, float]:
     return seconds
 
 
-def _rate(text: str) -> float:
-    rate = float(text)
-    if not 1.0 <= rate <= 60.0:
-        raise argparse.ArgumentTypeError(f"{text}: allowed: 1 to 60")
-    return rate
-
-
 def make_parser() -> argparse.ArgumentParser:
     """Its command line."""
     parser = Parser(prog="lightleash phone", description=__doc__)
@@ -148,7 +141,7 @@ def make_parser() -> argparse.ArgumentParser:
         help="with webrtc: how the server learns when a picture was taken",
     )
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
-    parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
+    parser.add_argument("--fps", type=number(1.0, 60.0), default=30.0, help="pictures a second")
     faults = [fault.value for fault in SensorFault]
     parser.add_argument("--fault", choices=faults, default="none", help="of its motion sensors")
     lies = [fault.value for fault in CameraFault]
@@ -184,8 +177,8 @@ async def play(arguments: argparse.Namespace, make_client: MakeClient) -> LivePh
     robot_file = load_robot(arguments.robot or access.robot, takes=COMMANDS)
     script = make_script(arguments, robot_file, port)
     live = LivePhone(access, script, port, robot_file.robot.axes, make_client)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, live.leave)
+    for one in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(one, live.leave)
     await live.run(arguments.seconds, _show)
     return live
 

@@ -10,13 +10,13 @@ from math import cos, pi, sin, tan
 
 import numpy as np
 
-from pipeline.frames import Array, R_between, wxyz_from_R
+from hardware.sim.plant.model import text_of
+from pipeline.frames import UP, Array, R_between, wxyz_from_R
 
 Beam = tuple[Array, Array]
 """(origin (3,) [m], unit direction (3,)) in f."""
 SIDES = 32
 """Of the bore as MuJoCo knows it: its faces touch the true one from outside."""
-UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,11 +80,7 @@ class Tube:
             R_fw = R_ft @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             place = self.centre_in_f + (self.radius + half[0]) * R_fw[:, 0]
             boxes.append(
-                f'<geom type="box" size="{_text(half)}" pos="{_text(place)}" '
-                f'quat="{_text(wxyz_from_R(R_fw))}" contype="0" conaffinity="0"/>'
+                f'<geom type="box" size="{text_of(half)}" pos="{text_of(place)}" '
+                f'quat="{text_of(wxyz_from_R(R_fw))}" contype="0" conaffinity="0"/>'
             )
         return "".join(boxes)
-
-
-def _text(values: Array | tuple[float, ...]) -> str:
-    return " ".join(f"{value:.12g}" for value in values)

@@ -6,10 +6,9 @@ import numpy as np
 
 from hardware.plant_parameters import PlantParameters, StandParameters, SuspensionParameters
 from hardware.sim.plant.obstacle import Obstacle
-from pipeline.frames import GRAVITY, Array, R_between, wxyz_from_R
+from pipeline.frames import GRAVITY, UP, Array, R_between, wxyz_from_R
 
 STEP_MS = 1
-UP = np.array([0.0, 0.0, 1.0])
 FOOT_RADIUS_M = 0.005
 
 
@@ -23,8 +22,8 @@ def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None, scenery:
     contact = "disable" if stand is None and obstacle is None else "enable"
     wall, tool = (obstacle.wall_mjcf(), obstacle.tool_mjcf()) if obstacle else ("", "")
     sites = "".join(
-        f'<site name="thruster{i}" pos="{_text(position)}" '
-        f'quat="{_text(wxyz_from_R(R_between(UP, direction / np.linalg.norm(direction))))}"/>'
+        f'<site name="thruster{i}" pos="{text_of(position)}" '
+        f'quat="{text_of(wxyz_from_R(R_between(UP, direction / np.linalg.norm(direction))))}"/>'
         for i, (position, direction) in enumerate(
             zip(parameters.thruster_positions_in_b, directions, strict=True)
         )
@@ -45,7 +44,7 @@ def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None, scenery:
         <body name="b">
           <freejoint/>
           <inertial pos="0 0 0" mass="{parameters.mass:.9g}"
-                    diaginertia="{_text(parameters.inertia)}"/>
+                    diaginertia="{text_of(parameters.inertia)}"/>
           <site name="com"/>
           {_hook(suspension)}{sites}{_contacts(parameters)}{tool}
         </body>
@@ -98,11 +97,12 @@ def _contacts(parameters: PlantParameters) -> str:
         return ""
     feet = stand.feet_in_b + FOOT_RADIUS_M * UP
     return "".join(
-        f'<geom type="sphere" size="{FOOT_RADIUS_M}" pos="{_text(place)}" '
+        f'<geom type="sphere" size="{FOOT_RADIUS_M}" pos="{text_of(place)}" '
         f'friction="{stand.friction:.9g} 0 0"/>'
         for place in (*feet, *parameters.thruster_positions_in_b)
     )
 
 
-def _text(values: Array | tuple[float, ...]) -> str:
+def text_of(values: Array | tuple[float, ...]) -> str:
+    """MuJoCo's words for numbers."""
     return " ".join(f"{value:.12g}" for value in values)

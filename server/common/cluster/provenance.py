@@ -16,6 +16,7 @@ import server
 LIBRARIES: Final = ("numpy", "scipy", "numba", "mujoco-core")
 ROOMS: Final = ("hardware", "pipeline", "server")
 ROOT: Final = Path(server.__file__).resolve().parents[1]
+"""Of the source tree, or of the site's packages."""
 
 
 def versions() -> Mapping[str, str]:

@@ -15,10 +15,11 @@ from server.experiments.all.page import Chapter, Ending, page
 from server.experiments.all.parts import PARTS, ReportPart
 from server.experiments.all.running import FINISHED, FolderError, RunRecord
 from server.experiments.all.tables import table
+from server.experiments.runner import REFUSED
 
 PAGE, FOLDER = "index.html", "parts"
 NOT_SAID: Final = "none are used"
-INTERRUPTED, REFUSED = 130, 2  # exit codes
+INTERRUPTED = 130  # exit code
 BLANK: Final = "\r\x1b[K"
 """Begins a terminal's line anew."""
 

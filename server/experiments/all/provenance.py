@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 import server
+from server.common.cluster.provenance import ROOT
 
 LIBRARIES: Final = (
     "numpy",
@@ -22,8 +23,6 @@ LIBRARIES: Final = (
     "aiortc",
     "matplotlib",
 )
-ROOT: Final = Path(server.__file__).resolve().parents[1]
-"""Of the source tree, or of the site's packages."""
 GIT_S: Final = 10.0
 
 

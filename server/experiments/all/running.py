@@ -21,14 +21,13 @@ from typing import Final, Literal, NoReturn
 import msgspec
 
 from server.common.clock import now, utc
-from server.experiments.all.provenance import ROOT
+from server.common.cluster.provenance import ROOT
+from server.experiments.runner import REFUSED
 
 Status = Literal["begun", "done", "missed", "refused", "failed"]
 FINISHED: Final = ("done", "missed")
 RECORD, OUTPUT, ERRORS = "part.json", "output.txt", "errors.txt"
 OURS: Final = (RECORD, OUTPUT, ERRORS)
-REFUSED: Final = 2
-"""Exit code of a command that can't run with these options, or not here."""
 MISSED: Final = (
     "The command ended with exit code 1: a statement or a goal was missed, or a flight ended "
     "early; the figures say which."

@@ -27,7 +27,7 @@ from pipeline.estimation.estimator import Estimator
 from pipeline.estimation.estimators import make_estimator
 from pipeline.frames import Array
 from server.common import text
-from server.common.ranges import number, seed_number
+from server.common.ranges import number, seed_number, whole
 from server.experiments.estimators.picture import draw
 from server.experiments.estimators.recording import play_recording
 from server.experiments.runner import ExperimentReport, experiment
@@ -173,13 +173,6 @@ def _progress(done: str) -> None:
         print(f"\r{done:<20}\r", end="", file=sys.stderr, flush=True)
 
 
-def _count(word: str) -> int:
-    count = int(word)
-    if count < 1:
-        raise argparse.ArgumentTypeError(f"{word}: at least 1")
-    return count
-
-
 def _positive(word: str) -> float:
     value = float(word)
     if not value > 0.0:
@@ -189,11 +182,11 @@ def _positive(word: str) -> float:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("--seeds", type=_count, default=4, help="so many worlds")
+    parser.add_argument("--seeds", type=whole(1, 1000), default=4, help="so many worlds")
     parser.add_argument("--seed", type=seed_number, default=1000, help="the first one")
-    parser.add_argument("--seconds", type=_positive, default=20.0)
+    parser.add_argument("--seconds", type=number(0.1, 3600.0), default=20.0)
     parser.add_argument("--latency-ms", nargs=2, type=number(0.0, 400.0), default=(60.0, 120.0))
-    parser.add_argument("--fps", type=_positive, default=30.0)
+    parser.add_argument("--fps", type=number(1.0, 240.0), default=30.0)
     parser.add_argument(
         "--hand", choices=tuple(MEASURED), default="", help="as recorded; else one with a tremor"
     )

@@ -10,10 +10,9 @@ from hardware.sim.camera_faults import CameraFault
 from server.experiments.faults import happenings as h
 from server.experiments.faults import tampering
 from server.experiments.faults.fault import Event, Fault, Happening
+from server.experiments.gaps.vanish import COAST_S, FOR_EVER_S, RAMP_S
 from server.phone.ingest import UNHEARD_S
 
-COAST_S: Final = 0.17
-RAMP_S: Final = 1.1
 ROBOT_S: Final = 0.075
 """Until the robot acts by itself."""
 ROBOT_RAMP_S: Final = 0.35
@@ -29,7 +28,6 @@ BACK_S: Final = 0.3
 """From the end of a gap until it follows: two pictures' periods (0.067 s; one may be lost, or not
 believed), a picture's way (up to 0.13 s), all good for 0.1 s. Without a picture taken since nobody
 knows where the robot is."""
-FOR_EVER: Final = h.FOR_EVER_S
 Times = Mapping[Event, float]
 
 
@@ -97,22 +95,22 @@ JUMPED: Final[Times] = {
 LET_GO: Final[Times] = {"HOLD": 0.06, "RAMP": HELD_S, "zero": HELD_S + RAMPED_S}
 
 PHONE: Final = (
-    gone("phone vanishes", "16", h.dark(FOR_EVER)),
+    gone("phone vanishes", "16", h.dark(FOR_EVER_S)),
     borne("phone is gone for 0.1 s", "18", h.dark(0.1)),
     borne("phone is gone for 0.4 s", "18", h.dark(0.4), {"COAST": COAST_S, "TRACK": 0.4 + BACK_S}),
     borne("phone is gone for 0.8 s", "18", h.dark(0.8), {"COAST": COAST_S, "TRACK": 0.8 + BACK_S}),
     gone("phone is gone for 3 s", "18", h.dark(3.0)),
     gone("page frozen for 3 s, then all at once", "17", h.selective(h.FROM_PHONE, 3.0, holds=True)),
-    gone("page hears nothing", "18", h.selective(("ping",), FOR_EVER), UNHEARD_S),
-    gone("signs of life stop", "17", h.selective(h.SIGNS, FOR_EVER)),
+    gone("page hears nothing", "18", h.selective(("ping",), FOR_EVER_S), UNHEARD_S),
+    gone("signs of life stop", "17", h.selective(h.SIGNS, FOR_EVER_S)),
     gone("one touch again and again", "20", h.tampered_with_memory(tampering.stale_touch)),
-    gone("motion sensors silent", "9", h.selective(("motion",), FOR_EVER)),
+    gone("motion sensors silent", "9", h.selective(("motion",), FOR_EVER_S)),
     borne(
         "motion sensors silent for 0.4 s", "9", h.selective(("motion",), 0.4), {"COAST": COAST_S}
     ),
     gone("rates are no numbers", "27", motion(tampering.no_number)),
     gone("a force without end", "27", motion(tampering.infinite)),
-    gone("motion sensors stuck", "9", h.stuck_motion(FOR_EVER), ON_THEIR_WAY_S),
+    gone("motion sensors stuck", "9", h.stuck_motion(FOR_EVER_S), ON_THEIR_WAY_S),
     borne("motion sensors stuck for 0.1 s", "9", h.stuck_motion(0.1)),
     borne(
         "motion sensors stuck for 0.4 s",
@@ -126,7 +124,7 @@ PHONE: Final = (
     open_ended("phone's clock back by 10 s", "12", h.clock(-10.0)),
 )
 PICTURES: Final = (
-    ends("pictures stop", "1", h.selective(("picture",), FOR_EVER), BLIND),
+    ends("pictures stop", "1", h.selective(("picture",), FOR_EVER_S), BLIND),
     borne("pictures stop for 1 s", "1", h.selective(("picture",), 1.0)),
     borne("pictures 0.2 s later", "2", h.slow_pictures(0.2)),
     ends(
@@ -164,10 +162,10 @@ FINGER: Final = (
         h.lifted(0.2, 0.4),
         {"COAST": COAST_S, "HOLD": 0.6, "RAMP": HELD_S + 0.2, "zero": HELD_S + 0.2 + RAMPED_S},
     ),
-    ramps("finger lifted, then the phone vanishes", "15", h.lifted(0.0, FOR_EVER), RAMP_S),
+    ramps("finger lifted, then the phone vanishes", "15", h.lifted(0.0, FOR_EVER_S), RAMP_S),
 )
 SERVER: Final = (
-    gone("server killed", "26", h.selective(h.ALL, FOR_EVER)),
+    gone("server killed", "26", h.selective(h.ALL, FOR_EVER_S)),
     borne(
         "server stands still for 0.3 s",
         "26",
@@ -177,7 +175,7 @@ SERVER: Final = (
     gone("server stands still for 2 s", "26", h.selective(h.ALL, 2.0, holds=True)),
 )
 ROBOT: Final = (
-    by_robot("robot's link dead", "23", h.robot_link(FOR_EVER), LOST),
+    by_robot("robot's link dead", "23", h.robot_link(FOR_EVER_S), LOST),
     borne("robot's link dark for 50 ms", "23", h.robot_link(0.05)),
     borne("robot's link dark for 0.15 s", "23", h.robot_link(0.15)),
     by_robot("robot's link dark for 1.5 s", "23", h.robot_link(1.5), LOST),
@@ -216,7 +214,7 @@ CONTROL: Final = (
 )
 PEOPLE: Final = (
     stops("STOP while it follows"),
-    stops("STOP while it coasts", 0.25, h.dark(FOR_EVER)),
+    stops("STOP while it coasts", 0.25, h.dark(FOR_EVER_S)),
     stops("STOP while it holds", 0.5, h.lifted(0.0)),
     stops("STOP while it ramps", 0.3, h.requested("disarm")),
     ramps("disarmed while it follows", "38", h.requested("disarm"), TICK_S),

@@ -14,9 +14,9 @@ from pipeline.frames import Array
 from server.experiments.faults.fault import FaultyFlight, Happening
 from server.experiments.faults.tampering import Datagrams, Inputs
 from server.experiments.gaps.schedule import GapSchedule, WebRtcLine
+from server.experiments.gaps.vanish import FOR_EVER_S
 from server.simulation.line import CleanLine, Kind
 
-FOR_EVER_S: Final = 1e6
 HONEST_S: Final = 2.0
 """Of a camera, until its check knows enough of the motion sensors."""
 

@@ -32,13 +32,12 @@ from server.common.access import direct
 from server.common.child import die_with
 from server.common.runtime import RUN_FILE
 from server.experiments.faults.catalogue import (
-    COAST_S,
-    RAMP_S,
     RAMPED_S,
     ROBOT_RAMP_S,
     ROBOT_S,
 )
 from server.experiments.faults.fault import FARTHEST_MM, ZERO_N
+from server.experiments.gaps.vanish import COAST_S, RAMP_S
 from server.recording.reader import read
 from server.recording.writer import STATUS
 from server.virtual_phone import live_loop

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from hardware.robot_file import RobotFile
+from hardware.sim.led_sensor_model import LED_NOISE_PX
 from hardware.sim.reference_trajectory import ReferenceTrajectory
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
@@ -20,8 +21,6 @@ from server.experiments.gaps.traces import minutes
 from server.simulation.line import CleanLine, PhoneLine
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
-LED_NOISE_PX: Final = 0.02
-"""As vision's of rendered pictures."""
 SETTLE_S: Final = 2.5
 """From the first press to the first gap: the integral must first learn the spring."""
 RELEASE_M_S: Final = 0.25

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from server.experiments.gaps import vanish
+from server.experiments.gaps.flight import RELEASE_M_S
 from server.experiments.gaps.measure import GapRow
 from server.experiments.gaps.schedule import heard_again
 from server.experiments.gaps.vanish import Vanished
@@ -14,7 +15,6 @@ FOLLOWS_PCT: Final = {160.0: 95.0, 250.0: 93.0, 400.0: 88.0}
 """Gap [ms], every 5 s, the button held: least share of the time."""
 TRACE_PCT: Final = 97.0
 EXCURSION_MM: Final = 50.0
-RELEASE_M_S: Final = 0.25
 STEP_MM: Final = 1.0
 BORNE_MS: Final = 400.0
 """Longer gaps are flown, and asked nothing."""

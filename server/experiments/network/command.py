@@ -12,7 +12,7 @@ import numpy as np
 
 from hardware.sim.network.emulated_link import EmulatedLink
 from hardware.sim.network.netns import NamespaceError
-from server.common.ranges import seed_number
+from server.common.ranges import number, seed_number
 from server.common.text import table
 from server.experiments.network.figures import drops, percentile, recovery
 from server.experiments.network.phone import CLIENTS, FRAME_RATE_HZ
@@ -156,13 +156,6 @@ def _row_json(row: NetworkRow, run: Run) -> dict[str, object]:
     return rounded | {"to_phone": run.counts[0], "to_server": run.counts[1]}
 
 
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not NEEDS_TIME_S <= value <= 3600.0:
-        raise argparse.ArgumentTypeError(f"{text}: allowed: {NEEDS_TIME_S:g} to 3600")
-    return value
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     descriptions = "; ".join(
@@ -172,7 +165,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), help=descriptions
     )
     parser.add_argument("--paths", nargs="+", choices=CLIENTS, default=list(CLIENTS))
-    parser.add_argument("--seconds", type=_seconds, default=30.0, help="of each scenario and path")
+    parser.add_argument(
+        "--seconds",
+        type=number(NEEDS_TIME_S, 3600.0),
+        default=30.0,
+        help="of each scenario and path",
+    )
     parser.add_argument(
         "--seed", type=seed_number, default=0, help="of the line's chances and of the hand"
     )

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.frames import Array
+from pipeline.vision.vision import STAGES
 from server.common.text import table
 from server.experiments.vision.errors import MEDIAN_CHI2_6, Error
-from server.experiments.vision.watch import STAGES, SceneRecord
+from server.experiments.vision.watch import SceneRecord
 
 NAN = float("nan")
 COLUMNS = (

@@ -16,7 +16,6 @@ from server.experiments.vision.channel import Channel, Wire
 from server.experiments.vision.errors import Error, is_wrong, measured
 from server.experiments.vision.plain import PlainTracker, pass_s
 
-STAGES = ("detect", "identify", "pose")
 FRESH_EVERY = 10
 """Pictures followed for one that is also tried from nothing."""
 FRESH_LOOKS = 3

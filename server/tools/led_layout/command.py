@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, radians
+from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from hardware.led_layout.reach import Ball, Reach
 from hardware.led_layout.viewpoints import Viewpoints, looks_about
 from pipeline.frames import Array
 from server.common.progress import progress_bar
+from server.common.ranges import number, whole
 from server.tools.led_layout.files import changes, figures, make_folder, toml, write
 from server.tools.led_layout.report import LayoutReport, judged, lines
 
@@ -28,30 +29,8 @@ SEARCH_VIEWS = 100
 HELP = "Can the LEDs be told apart from every view, how exact is a pose, would others be better?"
 
 
-def _number(low: float, high: float) -> Callable[[str], float]:
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = inf
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"a number from {low:g} to {high:g}, not {text!r}")
-        return value
-
-    return read
-
-
-def _whole(low: int, high: int) -> Callable[[str], int]:
-    def read(text: str) -> int:
-        if not (text.isdigit() and low <= int(text) <= high):
-            raise argparse.ArgumentTypeError(f"a whole number from {low} to {high}, not {text!r}")
-        return int(text)
-
-    return read
-
-
 def _distances(text: str) -> list[float]:
-    return sorted({_number(0.2, 50.0)(part) for part in text.split(",")})
+    return sorted({number(0.2, 50.0)(part) for part in text.split(",")})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,22 +42,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     views = parser.add_argument_group("views")
     add = views.add_argument
     add("--distances", type=_distances, metavar="M,M", help="default: 0.6, 1, 1.6 × [start]'s")
-    add("--azimuth", type=_number(1.0, 180.0), default=35.0, metavar="DEG", help="±, default 35")
-    add("--elevation", type=_number(1.0, 90.0), default=20.0, metavar="DEG", help="±, default 20")
+    add("--azimuth", type=number(1.0, 180.0), default=35.0, metavar="DEG", help="±, default 35")
+    add("--elevation", type=number(1.0, 90.0), default=20.0, metavar="DEG", help="±, default 20")
     add("--sphere", action="store_true", help="from everywhere")
-    add("--views", type=_whole(10, 5000), default=150, metavar="N", help="default 150")
-    add("--focal-px", type=_number(50.0, 2e4), default=914.0, help="default 914: phone at 720p")
-    add("--noise-px", type=_number(1e-3, 10.0), default=0.1, help="of a coordinate, default 0.1")
-    add("--gravity", type=_number(0.5, 60.0), default=10.0, metavar="DEG", help="default 10")
-    add("--attitude", type=_number(1.0, 120.0), default=30.0, metavar="DEG", help="default 30")
+    add("--views", type=whole(10, 5000), default=150, metavar="N", help="default 150")
+    add("--focal-px", type=number(50.0, 2e4), default=914.0, help="default 914: phone at 720p")
+    add("--noise-px", type=number(1e-3, 10.0), default=0.1, help="of a coordinate, default 0.1")
+    add("--gravity", type=number(0.5, 60.0), default=10.0, metavar="DEG", help="default 10")
+    add("--attitude", type=number(1.0, 120.0), default=30.0, metavar="DEG", help="default 30")
     better = parser.add_argument_group("a better layout")
     add = better.add_argument
     add("--improve", action="store_true", help="search for it, print [[leds]] to paste")
-    add("--reach", type=_number(1e-3, 2.0), metavar="M", help=_REACH)
-    add("--turns", type=_whole(1, 100_000), default=400, help="layouts per start, default 400")
-    add("--starts", type=_whole(1, 64), default=4, help="default 4; the first from the layout")
-    add("--seed", type=_whole(0, 2**31), default=1, help="default 1")
-    add("--enough-px", type=_number(0.5, 30.0), default=8.0, help="margin that is enough")
+    add("--reach", type=number(1e-3, 2.0), metavar="M", help=_REACH)
+    add("--turns", type=whole(1, 100_000), default=400, help="layouts per start, default 400")
+    add("--starts", type=whole(1, 64), default=4, help="default 4; the first from the layout")
+    add("--seed", type=whole(0, 2**31), default=1, help="default 1")
+    add("--enough-px", type=number(0.5, 30.0), default=8.0, help="margin that is enough")
 
 
 _REACH = "how far each LED may move where the file has no reach_m, reach_box_m, reach_segment_m"

@@ -9,13 +9,13 @@ import numpy as np
 
 from pipeline.frames import Array, R_co, wxyz_from_R
 from pipeline.signals import RelativePose
+from pipeline.vision.vision import STAGES
 
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 SIGMAS = (
     *("sigma_x_m", "sigma_y_m", "sigma_z_m"),
     *("sigma_rx_rad", "sigma_ry_rad", "sigma_rz_rad"),
 )
-STAGES = ("detect", "identify", "pose")
 COLUMNS = (
     *("frame", "t_s", "found"),
     *POSE,

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from server.common.options import Parser
+from server.common.ranges import number
 from server.media.frame_source import RATES_HZ
 from server.media.plots import picture_file
 
@@ -51,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
     words.add_argument("--body-imu", type=Path, metavar="body.csv", help="the robot's")
     words.add_argument(
         "--fps",
-        type=_fps,
+        type=number(*RATES_HZ),
         help="frames a second: without times.csv (default: 30), or of a film in place of its times",
     )
     words.add_argument("--out", type=Path, required=True, metavar="poses.csv")
@@ -62,17 +63,6 @@ def parser() -> argparse.ArgumentParser:
     )
     words.add_argument("--no-plot", action="store_true")
     return words
-
-
-def _fps(text: str) -> float:
-    try:
-        fps = float(text)
-    except ValueError:
-        fps = 0.0
-    least, most = RATES_HZ
-    if not least <= fps <= most:
-        raise argparse.ArgumentTypeError(f"{text!r}: allowed: {least:g} to {most:g}")
-    return fps
 
 
 def outputs_of(given: argparse.Namespace) -> dict[str, Path]:

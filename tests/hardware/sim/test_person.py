@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hardware.sim.person import SPEED_M_S, GuidingHand, Participant, misalignment, remedy
-from hardware.sim.plant.laser_task import UP, Laser, Tube
-from pipeline.frames import exp
+from hardware.sim.plant.laser_task import Laser, Tube
+from pipeline.frames import UP, exp
 
 H = 0.005
 LASER = Laser(np.array([0.0, 0.0, -0.2]), -UP)

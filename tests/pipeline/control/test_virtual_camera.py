@@ -122,7 +122,7 @@ def test_where_the_robot_is_in_f_does_not_depend_on_the_filter(config, p, R_fc, 
         R = R_fc @ rotation_about_x(0.1 * k)
         view = camera.view(relative(p, R_cb), R, H, p, HALF_FIELD)
         np.testing.assert_allclose(view.R_fv @ view.p_bv_in_v, R @ p, atol=1e-12)
-        np.testing.assert_allclose(view.R_fv @ view.R_vb, R @ R_cb, atol=1e-12)
+        np.testing.assert_allclose(view.R_fb, R @ R_cb, atol=1e-12)
         v_in_f = view.R_fv @ (view.v_bv_in_v + cross(view.omega_vf_in_v, view.p_bv_in_v))
         np.testing.assert_allclose(v_in_f, R @ relative(p, R_cb).u_bf_in_c, atol=1e-9)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
-from hardware.sim.plant.laser_task import SIDES, UP, Beam, Laser, Tube
+from hardware.sim.plant.laser_task import SIDES, Beam, Laser, Tube
 from hardware.sim.plant.plant import Plant, PlantOptions
-from pipeline.frames import R_between, exp
+from pipeline.frames import UP, R_between, exp
 
 TILT = radians(15.0)
 AXIS = np.array([0.0, -sin(TILT), cos(TILT)])

@@ -91,5 +91,5 @@ def test_options_out_of_range_are_refused(capsys):
     with pytest.raises(SystemExit):
         main(["leds", "ames", "--views", "3"])
     said = capsys.readouterr().err
-    assert "from 10 to 5000" in said
+    assert "allowed: 10 to 5000" in said
     assert said.count("\n") == 1
