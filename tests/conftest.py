@@ -48,6 +48,17 @@ def pytest_runtest_makereport(
     return report
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """So has a file whose first lines skip all of it."""
+    report = yield
+    if IS_CI and report.skipped:
+        report.outcome, report.longrepr = "failed", f"skipped in CI: {reason_of(report)}"
+    return report
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """The last line says what was not tested."""
     skipped = Counter(map(reason_of, terminalreporter.stats.get("skipped", [])))
@@ -56,7 +67,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"NOT TESTED HERE: {told}", yellow=True, bold=True)
 
 
-def reason_of(report: pytest.TestReport) -> str:
+def reason_of(report: pytest.TestReport | pytest.CollectReport) -> str:
     """Why it was skipped."""
     why = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
     return why.removeprefix("Skipped: ")

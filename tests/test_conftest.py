@@ -19,6 +19,11 @@ def test_without_a_tool(): pytest.skip("NO TOOL, not tested")
 @pytest.mark.skipif(True, reason="NO KERNEL, not tested")
 def test_without_a_kernel(): pass
 """
+WITHOUT_A_PACKAGE = """
+import pytest
+pytest.importorskip("no_such_package", reason="NO PACKAGE, not tested")
+def test_that_would_run(): pass
+"""
 BUSY = """
 import time
 import pytest
@@ -82,6 +87,18 @@ def test_a_skip_is_named_last_and_fails_in_ci(tmp_path: Path, words: tuple[str, 
     assert "1 failed, 1 passed, 1 error" in told
     assert "skipped in CI: NO KERNEL, not tested" in told
     assert "NOT TESTED" not in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [(), ("-n", "1")], ids=["one process", "workers"])
+def test_a_file_that_is_skipped_as_a_whole_fails_in_ci(
+    tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    code, told = ran(tmp_path, "", *words, tests=WITHOUT_A_PACKAGE)
+    assert "NOT TESTED HERE: NO PACKAGE, not tested (1)" in told
+    code, told = ran(tmp_path, "1", *words, tests=WITHOUT_A_PACKAGE)
+    assert code not in (0, 5)
+    assert "skipped in CI: NO PACKAGE, not tested" in told
 
 
 @pytest.mark.slow
