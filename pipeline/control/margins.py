@@ -19,7 +19,7 @@ lever arm, alignment), and that is mended by the late camera with the filter's b
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, pi, sqrt
@@ -43,7 +43,7 @@ OMEGA: Final = np.geomspace(0.03, 1500.0, 1200)
 OMEGA.setflags(write=False)
 S: Final = 1j * OMEGA
 KEPT: Final = 64
-"""Transfer functions of delays: a search asks for the same few again and again."""
+"""Transfer functions of each kind: a search asks for the same few again and again."""
 LEAST_DAMPING: Final = 0.01
 """Share of the critical one: without any, a pendulum's pole lies on the axis of the response."""
 TILT_AXIS: Final = {0: 4, 1: 3}
@@ -128,32 +128,22 @@ class Loop:
         c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
         if k == 0.0:
             poles += 1 if c > 0.0 else 2
-        return control * actuator / ((m * S + c) * S + k), poles
+        return control * actuator / _moved(m, c, k), poles
 
     def _measured(self, axis: int, sensing: Sensing) -> tuple[Complex, Complex]:
         """M(s) of place and of speed."""
-        frame = self.config.frame_s
-        seen: Complex = sensing.sees * _late(sensing.latency) * _hold(frame)
+        config = self.config
         if sensing.estimator == "none":
-            rated: Complex = seen * _hold(frame) / (1.0 + self.no_filter.tau * S)
-            return seen, rated
-        imu = _late(sensing.body_age)
-        share = self.config.unfelt * self._correction(axis)
-        known: Complex = imu * (1.0 - share) + share * seen
+            seen = _seen(sensing, config.frame_s)
+            return seen, _rated(sensing, config.frame_s, self.no_filter.tau)
+        w = config.correction_p if axis < 3 else config.correction_R
+        known = _known(sensing, config.frame_s, config.unfelt, w, of_second_order=axis < 3)
         return known, known
-
-    def _correction(self, axis: int) -> Complex:
-        """H(s) of the filter: of second order for places, of first for attitudes."""
-        if axis < 3:
-            w = self.config.correction_p
-            return np.asarray((1.4 * w * S + w * w) / (S * S + 1.4 * w * S + w * w))
-        w = self.config.correction_R
-        return np.asarray(w / (S + w))
 
     def _actuator(self, axis: int, sensing: Sensing) -> Complex:
         """Transfer function from the command of a force or torque to it."""
         d = self.dynamics
-        thrusters = _thrusters(d)
+        thrusters = _thrusters(d.delay, d.lag)
         if d.attitude is not None and axis != HEIGHT:
             return _by_autopilot(d.attitude, self._told.attitude or d.attitude, axis)
         if not d.needs_tilt or axis not in TILT_AXIS:
@@ -171,7 +161,7 @@ class Loop:
         self, axis: int, control: Complex, sensing: Sensing, config: FeedForwardConfig
     ) -> Complex:
         """Control with the pull balanced that accelerometer and thrust model tell apart."""
-        passed, given = _low_pass(config.pull_hz), _thrusters(self._told)
+        passed, given = _low_pass(config.pull_hz), _thrusters(self._told.delay, self._told.lag)
         if self.dynamics.needs_tilt and axis in TILT_AXIS:
             given = self._actuator(axis, sensing)  # it knows where the thrust points
         force = self._felt(axis, sensing)
@@ -192,11 +182,11 @@ class Loop:
         by_torque = (Kp * (twice + T * once) + Kd * (once + T * later)) / J
         by_disturbance = (Kp * d * (0.5 * d + T) + Kd * (d + T)) / J * _low_pass(DISTURBANCE_HZ)
         control = control + Kp * (d + T) * S * rated + by_disturbance * self._felt(axis, sensing)
-        return control, np.asarray(1.0 + _thrusters(self._told) * (by_torque - by_disturbance))
+        return control, np.asarray(1.0 + _thrusters(d, T) * (by_torque - by_disturbance))
 
     def _felt(self, axis: int, sensing: Sensing) -> Complex:
         """Force or torque that control takes the body's felt acceleration for, by its place."""
-        return np.asarray(self._told.inertia[axis] * S * S * _late(sensing.body_age))
+        return _felt(float(self._told.inertia[axis]), sensing.body_age)
 
 
 def turns_to_move(dynamics: Dynamics, axis: int) -> bool:
@@ -237,7 +227,7 @@ def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
     factors = list(_critical_factors(L))
     return AxisMargins(
         stable=True,
-        delay=delay_margin(L),
+        delay=_least_delay(crossings),
         phase=min((min(phase, 2.0 * pi - phase) for _, phase in crossings), default=pi),
         gain_up=min((k for k in factors if k > 1.0), default=inf),
         gain_down=max((k for k in factors if k < 1.0), default=0.0),
@@ -258,7 +248,10 @@ def _stable_open_loop(loop: Loop, axis: int, sensing: Sensing) -> Complex | None
 
 def delay_margin(late: Complex, fresh: Complex | float = 0.0) -> float:
     """How much later the part `late` of a stable open loop may act [s], the part `fresh` as now."""
-    crossings = _gain_crossings(np.asarray(late / (1.0 + fresh)))
+    return _least_delay(_gain_crossings(np.asarray(late / (1.0 + fresh))))
+
+
+def _least_delay(crossings: Iterable[tuple[float, float]]) -> float:
     return min((phase / omega for omega, phase in crossings), default=inf)
 
 
@@ -280,11 +273,18 @@ def _critical_factors(L: Complex) -> Iterator[float]:
         yield float(-1.0 / (L.real[i] + share * (L.real[i + 1] - L.real[i])))
 
 
-def _thrusters(dynamics: Dynamics) -> Complex:
-    """Transfer function from the command of a force or torque to it, of one that never tilts."""
-    return np.asarray(_late(dynamics.delay) / (1.0 + dynamics.lag * S) * _hold(PERIOD_S))
+def _kept(respond: Callable[..., Complex]) -> Callable[..., Complex]:
+    """Remembered, as most of what a margin costs is to work these out each time."""
+
+    def respond_once(*numbers: object, **more: object) -> Complex:
+        response = respond(*numbers, **more)
+        response.setflags(write=False)
+        return response
+
+    return lru_cache(maxsize=KEPT)(respond_once)
 
 
+@_kept
 def _by_autopilot(drive: AttitudeDrive, told: AttitudeDrive, axis: int) -> Complex:
     """From a force aside, or a yaw torque, that is wanted to it: who is told tilt and yaw rate.
 
@@ -299,18 +299,64 @@ def _by_autopilot(drive: AttitudeDrive, told: AttitudeDrive, axis: int) -> Compl
     return np.asarray(rated * late / (1.0 + (1.0 - late) / (drive.yaw_lag_s * S)))
 
 
-def _low_pass(hz: float) -> Complex:
-    return np.asarray(1.0 / (1.0 + S / (2.0 * pi * hz)))
+@_kept
+def _late(delay: float) -> Complex:
+    """Transfer function of a delay [s]."""
+    return np.asarray(np.exp(-S * delay))
 
 
+@_kept
 def _hold(period: float) -> Complex:
     """Transfer function of a value held for `period` [s]."""
     return np.asarray((1.0 - _late(period)) / (S * period))
 
 
-@lru_cache(maxsize=KEPT)
-def _late(delay: float) -> Complex:
-    """Transfer function of a delay [s]; most of what a margin costs, if worked out each time."""
-    late: Complex = np.exp(-S * delay)
-    late.setflags(write=False)
-    return late
+@_kept
+def _low_pass(hz: float) -> Complex:
+    return np.asarray(1.0 / (1.0 + S / (2.0 * pi * hz)))
+
+
+@_kept
+def _thrusters(delay: float, lag: float) -> Complex:
+    """Transfer function from the command of a force or torque to it, of one that never tilts."""
+    return np.asarray(_late(delay) / (1.0 + lag * S) * _hold(PERIOD_S))
+
+
+@_kept
+def _moved(m: float, c: float, k: float) -> Complex:
+    """Force or torque by the place: of mass, damping and stiffness."""
+    return np.asarray((m * S + c) * S + k)
+
+
+@_kept
+def _felt(inertia: float, body_age: float) -> Complex:
+    """Force or torque by the place, as it is felt."""
+    return np.asarray(inertia * S * S * _late(body_age))
+
+
+@_kept
+def _seen(sensing: Sensing, frame_s: float) -> Complex:
+    """A picture, held until the next."""
+    return np.asarray(sensing.sees * _late(sensing.latency) * _hold(frame_s))
+
+
+@_kept
+def _rated(sensing: Sensing, frame_s: float, tau: float) -> Complex:
+    """The difference of pictures, low-passed."""
+    return np.asarray(_seen(sensing, frame_s) * _hold(frame_s) / (1.0 + tau * S))
+
+
+@_kept
+def _known(
+    sensing: Sensing, frame_s: float, unfelt: float, w: float, *, of_second_order: bool
+) -> Complex:
+    """A filter's: as fresh as the body's IMU, but for a share that the camera mends."""
+    share = unfelt * _correction(w, of_second_order=of_second_order)
+    return np.asarray(_late(sensing.body_age) * (1.0 - share) + share * _seen(sensing, frame_s))
+
+
+def _correction(w: float, *, of_second_order: bool) -> Complex:
+    """H(s) of the filter [rad/s]: of second order for places, of first for attitudes."""
+    if of_second_order:
+        return np.asarray((1.4 * w * S + w * w) / (S * S + 1.4 * w * S + w * w))
+    return np.asarray(w / (S + w))

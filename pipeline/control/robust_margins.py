@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import product
 from math import degrees, log10, pi
 from typing import Final
@@ -103,15 +104,17 @@ def _slower(drive: AttitudeDrive | None, factor: float) -> AttitudeDrive | None:
     return replace(drive, lag_s=factor * drive.lag_s, yaw_lag_s=factor * drive.yaw_lag_s)
 
 
-def _dynamics(told: Dynamics) -> Iterator[Dynamics]:
-    """Those of every body: the corners of what was identified, a grid of what is assumed."""
+@lru_cache(maxsize=1)
+def _dynamics(told: Dynamics) -> tuple[Dynamics, ...]:
+    """Those of every body: the corners of what was identified, a grid of what is assumed.
+
+    A search asks for the same ones each time.
+    """
     doubt = told.uncertainty
-    if doubt.is_identified:
-        yield told  # which no corner is
     damping = np.maximum(told.damping - np.array(doubt.damping), 0.0)
     ranges = doubt.inertias(told.needs_tilt), doubt.thrusters(), doubt.stiffnesses()
-    for inertia, (lag, delay), stiffness in product(*ranges):
-        yield replace(
+    corners = (
+        replace(
             told,
             inertia=inertia * told.inertia,
             lag=lag * told.lag,
@@ -120,3 +123,6 @@ def _dynamics(told: Dynamics) -> Iterator[Dynamics]:
             stiffness=np.maximum(told.stiffness + stiffness, 0.0),
             damping=damping,
         )
+        for inertia, (lag, delay), stiffness in product(*ranges)
+    )
+    return (*[told] * doubt.is_identified, *corners)  # told is no corner
