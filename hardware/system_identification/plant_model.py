@@ -10,7 +10,8 @@ be taken for motion and make all numbers smaller.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from functools import lru_cache
+from typing import Final, TypeAlias
 
 import numpy as np
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
@@ -31,6 +32,10 @@ LEAST: Final = 0.05
 """Of inertia and stiffness that a file says."""
 EVERY: Final = 5
 """Periods from one residual to the next: 40 Hz for a band of 10."""
+KEPT: Final = 16
+"""Springs that are remembered: of two axes, and of each way from there that a fit tries."""
+Poles: TypeAlias = tuple[float, float, float]
+"""Of a mass of 1 kg on a damped spring: 1, damping [1/s], stiffness [1/s²]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,6 +150,7 @@ class PlantModel:
         bias_in_b = (flight.force_in_b - GRAVITY * flight.R_fb[:, 2]).mean(axis=0)
         force_in_f = np.einsum("nij,nj->ni", flight.R_fb, flight.force_in_b - bias_in_b)
         self._force_in_f, self._alpha = self._cut(force_in_f), self._cut(alpha)
+        self._swings = lru_cache(maxsize=KEPT)(self._swings_of)
 
     @property
     def measured(self) -> Array:
@@ -188,15 +194,12 @@ class PlantModel:
         stiffness = np.array((plant.sideways, plant.sideways, plant.along))
         damping = plant.air + np.array((0.0, 0.0, plant.damping))
         force = pushed_in_f - pushed_in_f.mean(axis=0) - stiffness * hook
-        start = np.zeros(len(force))
-        start[0] = 1.0 / PERIOD_S
         left, pull_in_f = np.empty_like(self._force_in_f), np.empty_like(force)
         for axis in range(3):
             poles = (1.0, float(damping[axis]), float(stiffness[axis]))
-            swings = [_moved(kick, poles) for kick in (start, np.gradient(start, PERIOD_S))]
+            swings, columns = self._swings(poles)
             motion = _moved(force[:, axis], poles)
             off = self._force_in_f[:, axis] - self._cut(motion[2])
-            columns = np.column_stack([self._cut(swing[2]) for swing in swings])
             shares, *_ = np.linalg.lstsq(columns, off)
             left[:, axis] = off - columns @ shares
             place, speed, _ = motion + np.tensordot(shares, swings, axes=1)
@@ -205,6 +208,13 @@ class PlantModel:
         pull_in_f[:, 2] += GRAVITY
         return left, np.einsum("nji,nj->ni", self._flight.R_fb, pull_in_f)
 
+    def _swings_of(self, poles: Poles) -> tuple[list[Array], Array]:
+        """Motions (3, n) after a kick to speed and to place, and what is seen of each (k, 2)."""
+        start = np.zeros(len(self._flight.commands))
+        start[0] = 1.0 / PERIOD_S
+        swings = [_moved(kick, poles) for kick in (start, np.gradient(start, PERIOD_S))]
+        return swings, np.column_stack([self._cut(swing[2]) for swing in swings])
+
     def _cut(self, signal: Array) -> Array:
         """What of a signal (n, ...) is in the band, without its ends, `EVERY` so many periods."""
         ends = round(ENDS_S / PERIOD_S)
@@ -212,11 +222,16 @@ class PlantModel:
         return inner
 
 
-def _moved(force: Array, poles: tuple[float, float, float]) -> Array:
+def _moved(force: Array, poles: Poles) -> Array:
     """Place, speed and acceleration (3, n) of a mass of 1 kg on a damped spring."""
+    return np.array([lfilter(b, a, force) for b, a in _filters(poles)])
+
+
+@lru_cache(maxsize=KEPT)
+def _filters(poles: Poles) -> list[tuple[Array, Array]]:
+    """For place, speed and acceleration; most of what a fit costs, if worked out each time."""
     numerators = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
-    filters = [bilinear(numerator, poles, fs=1.0 / PERIOD_S) for numerator in numerators]
-    return np.array([lfilter(b, a, force) for b, a in filters])
+    return [bilinear(numerator, poles, fs=1.0 / PERIOD_S) for numerator in numerators]
 
 
 def _as_differences(alpha: Array) -> Array:
