@@ -69,10 +69,27 @@ def _put(image: Image, corners_px: Array, tile: Array) -> None:
     left, top = np.floor(corners_px.min(axis=0) - reach).astype(int)
     size = int(np.ceil(3.0 * reach)) + 1
     target = (corners_px - (left, top) + 0.5) * FINER - 0.5
-    H = cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32))
-    fine = cv2.warpPerspective(tile, H, (size * FINER, size * FINER))
-    patch = cv2.resize(fine, (size, size), interpolation=cv2.INTER_AREA)
-    y, x = max(top, 0), max(left, 0)
-    part = image[y : top + size, x : left + size]
-    light = 255.0 * patch[y - top : y - top + len(part), x - left : x - left + part.shape[1]]
+    H: Array = np.asarray(
+        cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32)),
+        dtype=np.float64,
+    )
+    first, end = _reached(H, len(tile), size)
+    low_px = np.maximum(first, (-left, -top))
+    width, height = np.minimum(end, (image.shape[1] - left, image.shape[0] - top)) - low_px
+    if width <= 0 or height <= 0:
+        return
+    shift = np.eye(3)
+    shift[:2, 2] = -FINER * low_px
+    fine = cv2.warpPerspective(tile, shift @ H, (width * FINER, height * FINER))
+    light = 255.0 * cv2.resize(fine, (width, height), interpolation=cv2.INTER_AREA)
+    x, y = low_px + np.array((left, top))
+    part = image[y : y + height, x : x + width]
     part[:] = np.maximum(part, np.round(light).astype(np.uint8))
+
+
+def _reached(H: Array, side: int, size: int) -> tuple[Array, Array]:
+    """First and end (2,) of the pixels, 0 to `size`, that a tile of this side lightens."""
+    edges = np.array([[[-1.0, -1.0], [side, -1.0], [side, side], [-1.0, side]]])
+    px = (cv2.perspectiveTransform(edges, H)[0] + 0.5) / FINER
+    first, end = np.floor(px.min(axis=0)), np.ceil(px.max(axis=0))
+    return np.clip(first, 0, size).astype(int), np.clip(end, 0, size).astype(int)
