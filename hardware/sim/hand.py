@@ -61,14 +61,23 @@ class MovingHand:
         self._start = np.concatenate((p_start_in_f, rpy_start))
         self._R_fs = rotation_about_z(float(rpy_start[2]))
         self._t_moves = t_moves
+        self._latest: tuple[float, Array] | None = None
 
     def _rows(self, t: float) -> Array:
+        """(3, 6): value, rate and acceleration; asked for again and again at one time."""
+        latest = self._latest
+        if latest is None or latest[0] != t:
+            self._latest = latest = t, self._rows_at(t)
+        return latest[1]
+
+    def _rows_at(self, t: float) -> Array:
         rows = np.zeros((3, 6))
         if t > self._t_moves:
             for part in self._parts:
                 rows += part.at(t - self._t_moves)
         rows[:, :3] = rows[:, :3] @ self._R_fs.T
         rows[0] += self._start
+        rows.setflags(write=False)
         return rows
 
     def pose(self, t: float) -> tuple[Array, Array]:

@@ -41,12 +41,16 @@ class Waves:
         """(3, 6): value, rate and acceleration."""
         angle = self.omega * t + self.phase
         sines, cosines = self.amplitude * np.sin(angle), self.amplitude * np.cos(angle)
-        rows = (
-            sines.sum(axis=0),
-            (self.omega * cosines).sum(axis=0),
-            -(self.omega**2 * sines).sum(axis=0),
+        rows = np.array(
+            (
+                sines.sum(axis=0),
+                (self.omega * cosines).sum(axis=0),
+                -(self.omega**2 * sines).sum(axis=0),
+            )
         )
-        return weighed(_fade(t / self.fade_s) / self.fade_s ** np.arange(3), np.array(rows))
+        if t >= self.fade_s:  # as nearly always, in full
+            return rows
+        return weighed(_fade(t / self.fade_s) / self.fade_s ** np.arange(3), rows)
 
 
 def weighed(weight: Array, rows: Array) -> Array:

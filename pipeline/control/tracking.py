@@ -31,7 +31,7 @@ class Tracking:
 
     def __init__(self, robot: Robot, config: TeleopConfig) -> None:
         """For one robot."""
-        self._robot = robot
+        self._axes, self._tilts = robot.axes, robot.needs_tilt
         self._turns = robot.needs_tilt and robot.attitude is None
         self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
         self._looks_ahead = config.feedforward.enabled
@@ -95,8 +95,8 @@ class Tracking:
                 shares_in_f,
                 brakes_in_f,
             )
-            if not self._robot.needs_tilt:
-                ahead_in_b = ahead_in_b * self._robot.axes
+            if not self._tilts:
+                ahead_in_b = ahead_in_b * self._axes
             omega_rate_in_b = now.view.R_vb.T @ self._ahead.omega_rate_v_in_v
             error = self._compensation.ahead(error, now.view.omega_bf_in_b, omega_rate_in_b)
         wrench_in_b = self._pid.wrench(error, now.view) + ahead_in_b

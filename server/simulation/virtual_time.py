@@ -166,6 +166,8 @@ class VirtualTimeSimulation:
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._dark: deque[int] = deque(maxlen=120)
         """The LED that the robot kept dark with each pose."""
+        self._known: Truth | None = None
+        """All that, of this tick; None: nobody has asked."""
         self._on_their_way: deque[tuple[int, Record]] = deque()
         self._frames: list[EncodedFrame] = []
         self._inbox: list[Input] = []
@@ -217,6 +219,7 @@ class VirtualTimeSimulation:
         robot = self.follower.body
         self._poses.append((self.t, robot.wxyz_fb, robot.p_bf_in_f))
         self._dark.append(self.follower.dark)
+        self._known = None
         self._hear_phone(t_before)
         self._hear_small_talk()
         due = self.control_every > 0 and self._ticks % self.control_every == 0
@@ -252,9 +255,11 @@ class VirtualTimeSimulation:
         return self.scene.hidden_at(t) + ((dark,) if dark != NONE else ())
 
     def _truth(self) -> Truth:
-        times, wxyz, p = zip(*self._poses, strict=True)
-        dark = np.array(self._dark, dtype=np.int8)
-        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0), dark)
+        if self._known is None:
+            times, wxyz, p = zip(*self._poses, strict=True)
+            dark = np.array(self._dark, dtype=np.int8)
+            self._known = Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0), dark)
+        return self._known
 
     def _hear_phone(self, t_before: float) -> None:
         """Sensors and pictures that arrive within this period."""
