@@ -13,7 +13,7 @@ import numpy as np
 from hardware.robot_file import RobotFile
 from server.common.text import Column, dashed
 from server.experiments.contact.setting import Way
-from server.experiments.paper.setup.flight import Flight
+from server.experiments.paper.setup.flight import Flight, Move
 from server.experiments.paper.setup.measure import rms
 from server.simulation.sensors import Leader
 
@@ -52,7 +52,7 @@ def free_flights(
     for hand in HANDS:
         for way in ways:
             config = way.config(robot_file, leader)
-            traces = [Flight(robot_file, config, leader, hand, s).run(SECONDS) for s in seeds]
+            traces = [Flight(robot_file, config, leader, s).run(Move(hand), SECONDS) for s in seeds]
             ended = next((trace.ended for trace in traces if trace.ended), "")
             far = [rms(np.linalg.norm(trace.missed_in_b[:, :3], axis=1)) for trace in traces]
             flown.append(Free(hand, way.name, nan if ended else 1e3 * float(np.mean(far)), ended))

@@ -14,7 +14,7 @@ from pipeline.frames import Array
 from server.common.text import Column, flights, statements
 from server.experiments.paper.picture import figure_9
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.flight import ExperimentTrace, Push
+from server.experiments.paper.setup.flight import ExperimentTrace, Move, Push
 from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.variants import WITH_VCI, Variant
 
@@ -93,8 +93,8 @@ def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> Pushed:
     """Fly with the push and without; the paper's variant first."""
     rows, shown = [], []
     for variant in (WITH_VCI, *extra):
-        pushed = setup.fly(variant, HAND, SECONDS, PUSH)
-        rows.append(rejection(variant.name, pushed, setup.fly(variant, HAND, SECONDS)))
+        pushed, left = setup.fly_each(variant, [Move(HAND, PUSH), Move(HAND)], SECONDS)
+        rows.append(rejection(variant.name, pushed, left))
         shown.append(pushed[0])
     flown = (trace for trace in shown if not trace.ended)
     return Pushed(tuple(rows), next(flown, shown[0]))

@@ -9,7 +9,7 @@ from pathlib import Path
 from server.experiments.paper.picture import figure_6
 from server.experiments.paper.result import PaperResult
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.flight import ExperimentTrace
+from server.experiments.paper.setup.flight import ExperimentTrace, Move
 from server.experiments.paper.setup.measure import ComparedFigure, ExperimentSetup, cell_of
 from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Variant
 
@@ -23,8 +23,8 @@ def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> PaperResul
     cells: list[ComparedFigure] = []
     shown: dict[str, ExperimentTrace] = {}
     for variant in (WITHOUT_EKF, WITH_EKF, *extra):
-        for axis in "xyz":
-            traces = setup.fly(variant, f"step_{axis}", SECONDS)
+        flown = setup.fly_each(variant, [Move(f"step_{axis}") for axis in "xyz"], SECONDS)
+        for axis, traces in zip("xyz", flown, strict=True):
             paper = published.TABLE_I.get(variant.name, {}).get(axis, nan)
             cells.append(cell_of(variant.name, axis, paper, traces))
             if axis == "x":

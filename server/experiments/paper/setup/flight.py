@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hardware.robot_file import RobotFile
-from hardware.sim.hand import make_hand
+from hardware.sim.hand import Hand, make_hand
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
@@ -29,6 +29,15 @@ class Push:
     """Since the arm's move [s]."""
     y_n: float
     """Along y_b [N]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """What is done to a robot that hovers."""
+
+    hand: str
+    """How the arm moves, of `hardware.sim.hand.HANDS`."""
+    push: Push | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,33 +71,44 @@ class _Rows:
 
 
 class Flight:
-    """One flight; `run` gives its trace."""
+    """One flight; `run` gives its trace, `hover` what all moves begin with."""
 
     def __init__(
         self,
         robot_file: RobotFile,
         config: TeleopConfig,
         leader: Leader,
-        hand: str,
         seed: int = 0,
-        push: Push | None = None,
     ) -> None:
-        """Everything at rest; `hand` is one of `hardware.sim.hand.HANDS`."""
-        self._robot, self._push = robot_file.robot, push
-        moves = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
-        self._loop = VirtualTimeSimulation(robot_file, config, leader.scene(seed), prompt(), moves)
+        """Everything at rest."""
+        self._robot, self._start, self._seed = robot_file.robot, robot_file.start, seed
+        still = self._hand("still")
+        self._loop = VirtualTimeSimulation(robot_file, config, leader.scene(seed), prompt(), still)
+        self._push: Push | None = None
         self._push_in_b = np.zeros(6)
         self._rows, self._ended = _Rows(), ""
 
-    def run(self, seconds: float) -> ExperimentTrace:
+    def hover(self) -> None:
+        """Fly until just before the arm's move, whatever that will be."""
+        self._fly_until(HOVER_S - 2.0 * PERIOD_S)
+
+    def run(self, move: Move, seconds: float) -> ExperimentTrace:
         """Fly until `seconds` after the arm's move, or until tracking ends."""
-        for _ in range(round((HOVER_S + seconds) / PERIOD_S)):
-            self._advance()
-            if self._ended:
-                break
+        self._push, self._loop.phone.hand = move.push, self._hand(move.hand)
+        self._fly_until(HOVER_S + seconds)
         if not self._ended and not self._rows.t:
             self._ended = "tracking never began"
         return self._trace()
+
+    def _hand(self, name: str) -> Hand:
+        """It rests until the arm's move."""
+        return make_hand(name, seed=self._seed, start=self._start, rest_s=HOVER_S)
+
+    def _fly_until(self, t: float) -> None:
+        for _ in range(round((t - self._loop.t) / PERIOD_S)):
+            if self._ended:
+                return
+            self._advance()
 
     def _advance(self) -> None:
         """One control period of everything."""

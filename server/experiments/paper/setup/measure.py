@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import nan
 from typing import Final
 
@@ -13,7 +14,8 @@ from hardware.robot_file import RobotFile
 from hardware.robot_schema import AXES
 from pipeline.frames import Array
 from server.common.text import Column, flights
-from server.experiments.paper.setup.flight import ExperimentTrace, Flight, Push
+from server.experiments.forked import forked
+from server.experiments.paper.setup.flight import ExperimentTrace, Flight, Move, Push
 from server.experiments.paper.setup.variants import Variant, config_of
 from server.simulation.sensors import Leader
 
@@ -36,11 +38,23 @@ class ExperimentSetup:
         self, variant: Variant, hand: str, seconds: float, push: Push | None = None
     ) -> list[ExperimentTrace]:
         """One flight for each seed, until `seconds` after the arm's move."""
+        move = Move(hand, push)
+        return [flight.run(move, seconds) for flight in self._flights(variant)]
+
+    def fly_each(
+        self, variant: Variant, moves: Sequence[Move], seconds: float
+    ) -> list[list[ExperimentTrace]]:
+        """The same of each move; until it begins all are one flight, flown once."""
+        traces: list[list[ExperimentTrace]] = [[] for _ in moves]
+        for flight in self._flights(variant):
+            flight.hover()
+            for of_move, move in zip(traces, moves, strict=True):
+                of_move.append(forked(partial(flight.run, move, seconds)))
+        return traces
+
+    def _flights(self, variant: Variant) -> Iterator[Flight]:
         config = config_of(self.robot_file, variant, self.leader)
-        flights = (
-            Flight(self.robot_file, config, self.leader, hand, seed, push) for seed in self.seeds
-        )
-        return [flight.run(seconds) for flight in flights]
+        return (Flight(self.robot_file, config, self.leader, seed) for seed in self.seeds)
 
 
 @dataclass(frozen=True, slots=True)
