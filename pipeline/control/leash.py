@@ -41,6 +41,9 @@ from pipeline.robot import Robot
 
 ZERO: Final = np.zeros(3)
 ZERO.setflags(write=False)
+ALL: Final = np.eye(3)
+"""Of a motion."""
+ALL.setflags(write=False)
 NOTHING_M: Final = 1e-4
 """Less of an offset that is on its way out has gone [m]."""
 
@@ -151,9 +154,9 @@ class Leash:
         held = _moved(error, R_fv, self._offset_in_f)
         if not is_bent:
             return Leashed(held, taken)
-        J = np.eye(3) if J is None else J
+        J = ALL if J is None else J
         e_p_rate_in_v = error.e_p_rate_in_v + R_fv.T @ rate_in_f
-        brakes_in_f = ((J - np.eye(3)) @ v_r_in_f - rate_in_f) / self._nears_s
+        brakes_in_f = ((J - ALL) @ v_r_in_f - rate_in_f) / self._nears_s
         return Leashed(replace(held, e_p_rate_in_v=e_p_rate_in_v), taken, J, brakes_in_f)
 
     def _bend(self, x_in_f: Array, R_fr: Array, h: float) -> tuple[Array, Array | None]:
@@ -173,7 +176,7 @@ class Leash:
         kept = (self._free + rest * bent) / taken
         kept_rate = ((1.0 - bent * bent) - kept) / taken
         across = np.outer(x_in_f, self._stiffness_in_f * (R_fr @ gradient))
-        return (kept - 1.0) * x_in_f, kept * np.eye(3) + kept_rate * across
+        return (kept - 1.0) * x_in_f, kept * ALL + kept_rate * across
 
 
 def _until_nothing(offset_in_f: Array) -> Array:
