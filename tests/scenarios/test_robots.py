@@ -7,6 +7,7 @@ glides and can't leave the floor.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hardware.robot_file import COMMANDS, load_robot
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
+from server.experiments.forked import forked
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 pytestmark = pytest.mark.slow
@@ -104,14 +106,20 @@ LOSSES: list[Callable[[VirtualTimeSimulation], None]] = [
 WHICH = ["phone", "link", "disarm", "button"]
 
 
-def after_a_loss(
-    name: str, lose: Callable[[VirtualTimeSimulation], None], seconds: float
-) -> list[Array]:
-    """Places of the robot from 8 s into a flight, when it is lost, on (n, 3); checked all along."""
+@cache
+def flying(name: str) -> VirtualTimeSimulation:
+    """8 s into a flight."""
     loop = loop_of(name, "moving", RAYS_PX)
     while loop.t < TAKEN_OFF_S + 1.0:
         loop.advance()
         assert not loop.trace.left
+    return loop
+
+
+def after_a_loss(
+    loop: VirtualTimeSimulation, lose: Callable[[VirtualTimeSimulation], None], seconds: float
+) -> list[Array]:
+    """Places of the robot from then on, when it is lost, (n, 3); checked all along."""
     loop._script.operator.leaving = True
     lose(loop)
     places = []
@@ -148,7 +156,7 @@ def test_a_quadrotor_whose_thrusters_give_more_than_they_are_told_does_not_rise_
 def test_a_quadrotor_that_loses_what_leads_it_lands_upright_nearby(
     lose: Callable[[VirtualTimeSimulation], None], name: str
 ) -> None:
-    places = np.array(after_a_loss(name, lose, 10.0))
+    places = np.array(forked(partial(after_a_loss, flying(name), lose, 10.0)))
     assert places[0, 2] > 0.3
     assert abs(places[-1, 2]) < 2e-3
     # 3 s of HOLD on the gyroscope alone: a degree of tilt makes a metre
@@ -162,7 +170,7 @@ def test_a_quadrotor_that_loses_what_leads_it_lands_upright_nearby(
 def test_a_ground_robot_that_loses_what_leads_it_stops(
     lose: Callable[[VirtualTimeSimulation], None],
 ) -> None:
-    places = np.array(after_a_loss("ground", lose, 5.0))
+    places = np.array(forked(partial(after_a_loss, flying("ground"), lose, 5.0)))
     assert np.linalg.norm(places[-1] - places[0]) < 0.1
 
 
