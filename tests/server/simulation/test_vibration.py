@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,7 @@ def simulation(
     return VirtualTimeSimulation(AMES, TeleopConfig(), scene, operator, plant=plant)
 
 
+@cache
 def flown(vibration: Vibration | None, seed: int) -> tuple[float, float, tuple[str, ...]]:
     """RMS error [mm] and ANEES(6) once it is known, and what is doubted then."""
     flight = simulation(vibration, seed)
