@@ -130,13 +130,14 @@ class Keyed:
         """`spline` gives (6,) over time [s]; its rates and accelerations vanish at both ends."""
         self._orders = (spline, spline.derivative(1), spline.derivative(2))
         self._first, self._last = float(spline.t[0]), float(spline.t[-1])
+        self._begin, self._end = spline(self._first), spline(self._last)
 
     def at(self, t: float) -> Array:
         """(3, 6): value, rate and acceleration."""
         if self._first < t < self._last:
             return np.array([order(t) for order in self._orders])
         rows = np.zeros((3, 6))
-        rows[0] = self._orders[0](min(max(t, self._first), self._last))
+        rows[0] = self._end if t >= self._last else self._begin
         return rows
 
 
