@@ -62,7 +62,7 @@ REFUSALS = {
     "no camera": (["--camera", "{tmp}/none.yaml"], None, "none.yaml: No such file"),
     "another size": (["--camera", "{tmp}/large.yaml"], None, "00000.png: is 640x480, but"),
     "no leds": (["--robot", "{tmp}/none.toml"], None, "none.toml: No such file"),
-    "bad fps": (["--fps", "0"], None, "--fps: '0': allowed: 0.01 to 10000"),
+    "bad fps": (["--fps", "0"], None, "--fps: 0: allowed: 0.01 to 10000"),
     "bad plot": (["--plot", "a.gif"], None, "allowed: .png, .pdf, .svg"),
     "nowhere": (["--out", "{tmp}/none/poses.csv"], None, "--out: there is no folder"),
     "over an input": (["--covariance", "{}/camera.yaml"], None, "--covariance: "),
