@@ -23,7 +23,6 @@ class GivenAttitude:
         self.commanded = np.zeros(4)
         """By the last command."""
         self._drive, self._lift = drive, GivenThrusts(1, most, max_rise, ramp_us, None)
-        self._fading_since_us: int | None = None
 
     def __bool__(self) -> bool:
         """Whether there is any thrust."""
@@ -42,16 +41,12 @@ class GivenAttitude:
 
     def at(self, now_us: int) -> Array:
         """What to give now (4,)."""
-        since_us = self._fading_since_us
-        elapsed_us = 0 if since_us is None else max(0, now_us - since_us)
-        leans = max(0.0, 1.0 - elapsed_us / TO_MEAN_US) * self.commanded
+        leans = max(0.0, 1.0 - self._lift.fades_us(now_us) / TO_MEAN_US) * self.commanded
         return np.concatenate((leans[: LIFT.start], self._lift.at(now_us)))
 
     def fade(self, since_us: int) -> None:
         """Go level, and let the thrust fall to zero within the ramp's time."""
         self._lift.fade(since_us)
-        if self._fading_since_us is None:
-            self._fading_since_us = since_us
 
     def has_faded(self, now_us: int) -> bool:
         """Whether the ramp is over."""
@@ -60,9 +55,9 @@ class GivenAttitude:
     def follow(self, told: Array, now_us: int) -> None:
         """Give what is commanded; after a silence the thrust goes there by the rise allowed."""
         self._lift.follow(told[LIFT], now_us)
-        self.commanded, self._fading_since_us = told, None
+        self.commanded = told
 
     def zero(self) -> None:
         """Give zero at once."""
         self._lift.zero()
-        self.commanded, self._fading_since_us = np.zeros(4), None
+        self.commanded = np.zeros(4)

@@ -54,7 +54,7 @@ class GivenThrusts:
         """Thrusts to give now (m,) [N]."""
         if self._fading_since_us is None:
             return self._base.copy()
-        elapsed_us = max(0, now_us - self._fading_since_us)
+        elapsed_us = self.fades_us(now_us)
         last = max(0.0, 1.0 - elapsed_us / TO_MEAN_US)
         kept = self._mean + last * (self._base - self._mean)
         faded = kept * max(0.0, 1.0 - elapsed_us / self._ramp_us)
@@ -68,6 +68,10 @@ class GivenThrusts:
         """
         if self._fading_since_us is None:
             self._fading_since_us = since_us
+
+    def fades_us(self, now_us: int) -> int:
+        """For how long it has been fading; 0 while it follows."""
+        return 0 if self._fading_since_us is None else max(0, now_us - self._fading_since_us)
 
     def has_faded(self, now_us: int) -> bool:
         """Whether the ramp is over."""

@@ -6,6 +6,7 @@ import socket
 
 import numpy as np
 
+from hardware.contract import exchange
 from hardware.link.mavlink.autopilot_end import AutopilotEnd
 from hardware.link.mavlink.mavlink_follower import MavlinkFollower
 from hardware.robot_file import robot_of, robot_path, robot_table
@@ -43,18 +44,22 @@ class MavlinkRig:
         """On our clock, which is another than the autopilot's [s]."""
         self.booted = STAMP_BEFORE_S
         self.follower = self.leader(1)
-        drive = self.robot_file.robot.twist
-        self.body = TwistPlant(drive, self.robot_file.plant.imu, np.random.default_rng(seed))
-        names = self.robot_file.link.mavlink
+        self.body, self.autopilot = self.flown(np.random.default_rng(seed), autopilot)
+
+    def flown(self, rng, autopilot):
+        """Body, and the autopilot that flies it."""
+        drive, names = self.robot_file.robot.twist, self.robot_file.link.mavlink
+        body = TwistPlant(drive, self.robot_file.plant.imu, rng)
         odometry = names.twist_from == "ODOMETRY"
         told = {"system": names.system, "odometry": odometry} | autopilot
-        self.autopilot = LabAutopilot(self.follower.port, self.body, drive, **told)
+        return body, LabAutopilot(self.follower.port, body, drive, **told)
 
     def leader(self, epoch: int, port: int = 0) -> MavlinkFollower:
         """A control process's end; port 0 takes any free one."""
         link = self.robot_file.link
         end = AutopilotEnd(self.robot_file, link.host, link.mavlink, epoch)
-        return MavlinkFollower((LOCALHOST, port), end, lambda: self.now)
+        thrusters = self.robot_file.robot.A.shape[1]
+        return MavlinkFollower((LOCALHOST, port), end, lambda: self.now, thrusters=thrusters)
 
     @property
     def stamp(self) -> float:
@@ -71,6 +76,20 @@ class MavlinkRig:
     def close(self) -> None:
         self.follower.close()
         self.autopilot.close()
+
+
+def led(rig, seconds, command):
+    """Samples of a rig that is told the same for so long."""
+    samples = []
+    for _ in range(round(seconds / 0.005)):
+        samples += exchange(rig.follower, command)
+        rig.advance(0.005)
+    return samples
+
+
+def told(rig):
+    """(n, k): each set-point that its autopilot has read."""
+    return np.array([set_point for _, set_point in rig.autopilot.taken])
 
 
 class MavlinkFlight(FollowerFlight, MavlinkRig):

@@ -7,16 +7,16 @@ import pytest
 
 pytest.importorskip("pymavlink", reason="NO PYMAVLINK: pip install pymavlink")
 
-from hardware.contract import AttitudeFollowerContract, exchange
+from hardware.contract import AttitudeFollowerContract
 from hardware.follower import AttitudeCommand, FollowerState, Refusal
 from pipeline.frames import exp
 from tests.hardware.link.mavlink.copter_rig import CopterFlight, CopterRig, copter
 from tests.hardware.link.mavlink.lab_autopilot import OFFBOARD, POSCTL
+from tests.hardware.link.mavlink.mavlink_rig import led, told
 from tests.hardware.link.mavlink.test_mavlink_flight import rms_mm
 
 LEADS = AttitudeCommand(np.array([0.02, -0.03, 0.1, 6.0]), armed=True)
 """It stands, and goes on standing."""
-PERIOD_S = 0.005
 
 
 @pytest.fixture
@@ -33,11 +33,7 @@ class TestContract(AttitudeFollowerContract):
 
 
 def lead(rig, seconds, command=LEADS):
-    samples = []
-    for _ in range(round(seconds / PERIOD_S)):
-        samples += exchange(rig.follower, command)
-        rig.advance(PERIOD_S)
-    return samples
+    return led(rig, seconds, command)
 
 
 def running(rig):
@@ -45,10 +41,6 @@ def running(rig):
     assert lead(rig, 0.4)[-1].state == FollowerState.RUNNING
     rig.autopilot.taken.clear()
     return rig
-
-
-def told(rig):
-    return np.array([attitude for _, attitude in rig.autopilot.taken])
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.2, -1.0])

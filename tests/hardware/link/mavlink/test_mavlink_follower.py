@@ -20,7 +20,9 @@ from tests.hardware.link.mavlink.mavlink_rig import (
     STAMP_BEFORE_S,
     MavlinkRig,
     free_port,
+    led,
     mavlink_robot,
+    told,
 )
 
 FORWARD = TwistCommand(np.array([0.25, 0.1, 0.05, 0.0, 0.0, 0.5]), armed=True)
@@ -70,11 +72,7 @@ class TestContractWithoutMotionSensors(LedByMavlink):
 
 
 def lead(rig, seconds, command=FORWARD):
-    samples = []
-    for _ in range(round(seconds / PERIOD_S)):
-        samples += exchange(rig.follower, command)
-        rig.advance(PERIOD_S)
-    return samples
+    return led(rig, seconds, command)
 
 
 def running(rig):
@@ -83,10 +81,6 @@ def running(rig):
     assert samples[-1].state == FollowerState.RUNNING
     rig.autopilot.taken.clear()
     return rig
-
-
-def told(rig):
-    return np.array([twist for _, twist in rig.autopilot.taken])
 
 
 def test_each_command_comes_once_and_as_it_was_given_whatever_the_heading(rig):
