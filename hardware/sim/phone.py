@@ -21,6 +21,9 @@ from pipeline.signals import Image
 BodyHistory = Callable[[float], tuple[Array, Array]]
 """(R_fb (3, 3), p_bf_in_f (3,) [m]) of the robot at a time [s]."""
 
+Film = Callable[[Camera, float, BodyHistory, np.random.Generator], Image]
+"""Luma (height, width) that a camera shows at a time [s] of a robot that moved so."""
+
 REMEMBERED_DELAYS = 1024
 """Drawn before the flight, and used again in turn: a picture keeps its delay."""
 
@@ -51,6 +54,8 @@ class PhoneOptions:
     motion_delay_s: tuple[float, float] = (0.015, 0.040)
     """Between capture and arrival, evenly spread; nothing overtakes."""
     picture_delay_s: tuple[float, float] = (0.060, 0.120)
+    date_jitter_s: float = 0.0
+    """Standard deviation of what a picture's date is off by, each by its own [s]."""
     sigma_omega: float = radians(0.03)
     """White noise of the gyroscope, one axis [rad/s]."""
     sigma_a: float = 0.006
@@ -180,7 +185,7 @@ class VirtualPhone:
         self.hidden, self._twin, self._twin_hidden = hidden, twin, twin_hidden
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
         self._leds_in_b, self._look, self._body = leds_in_b, look, body
-        schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
+        schedule, self._sensor_rng, self._picture_rng, self._date_rng = rng.spawn(4)
         self.lies = FaultyCamera(
             options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
         )
@@ -188,8 +193,8 @@ class VirtualPhone:
         """From when to when [s] the motion sensors' last sample is read again and again."""
         self._read: tuple[float, MotionReading] | None = None
         """When the last sample was measured [s], and what it says."""
-        self.films: Callable[[Camera, float, np.random.Generator], Image] | None = None
-        """What it sees at a time [s] in place of LEDs in a room."""
+        self.films: Film | None = None
+        """What it sees in place of LEDs before an empty wall."""
         self._last: tuple[float, Image] | None = None
         """The moment [s] that the last picture shows, and the picture."""
         self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
@@ -247,6 +252,15 @@ class VirtualPhone:
             0 if o.fault is SensorFault.SCREEN_ANGLE else o.screen_angle_deg,
         )
 
+    def dated(self, t: float) -> float:
+        """What the phone takes for the time of a picture exposed around `t`, by our clock [s].
+
+        The motion sensors' clock is meant, beside which the camera's mounting says how it goes.
+        """
+        jitter_s = self.options.date_jitter_s
+        jitter = jitter_s * self._date_rng.standard_normal() if jitter_s > 0.0 else 0.0
+        return t - self.camera.extrinsics.time_offset_s + jitter
+
     def relative_pose(self, t: float, body: BodyHistory) -> tuple[Array, Array]:
         """True (R_cb (3, 3), p_bc_in_c (3,) [m]) at `t` [s]."""
         R_fc, p_cf_in_f = self.hand.pose(t)
@@ -263,7 +277,7 @@ class VirtualPhone:
             return lambda dt: self.relative_pose(moment + dt, robot)
 
         if self.films is not None:
-            image = self.films(seen_by, moment, self._picture_rng)
+            image = self.films(seen_by, moment, body, self._picture_rng)
         else:
             shown = np.delete(self._leds_in_b, list(self.hidden(moment)), axis=0)
             others = []

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import get_args
 
@@ -13,6 +14,8 @@ import numpy as np
 
 from hardware.robot_file import BY_GAINS, load_robot
 from hardware.sim.hand import make_hand
+from hardware.sim.phone import PhoneOptions
+from hardware.sim.scenes.flown import FLOWN
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
 from server.common import clock, text
@@ -29,6 +32,7 @@ Hidden = tuple[float, float, tuple[int, ...]]
 RECORDED = ("filming", "before_target")
 """Hands as people's move; what `steady` and `moving` are shaken by is no hand's tremor."""
 HEADINGS = (
+    ("around", "around", "{:<15}"),
     ("hand", "hand", "{:<9}"),
     ("seed", "seed", "{:>4}"),
     ("tracked_s", "tracked s", "{:>9.1f}"),
@@ -85,9 +89,16 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     if arguments.live:
         return live(arguments)
     low, high = arguments.latency_ms
-    scene = SimulationOptions(
-        latency_s=(1e-3 * low, 1e-3 * high),
+    latency_s = 1e-3 * low, 1e-3 * high
+    sensors = PhoneOptions(
         frame_rate_hz=arguments.fps,
+        picture_delay_s=latency_s,
+        date_jitter_s=1e-3 * arguments.date_jitter_ms,
+    )
+    scene = SimulationOptions(
+        latency_s=latency_s,
+        frame_rate_hz=arguments.fps,
+        sensors=sensors,
         codec=arguments.codec,
         hidden=hidden(arguments.hide, len(robot_file.robot.leds_in_b)),
     )
@@ -95,10 +106,13 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
         f"{arguments.robot}, gains {arguments.gains}, estimator {estimator}, virtual camera "
         f"{cutoff_hz(config.virtual_camera):.2f} Hz, {scene.width}x{scene.height} at "
         f"{scene.frame_rate_hz:g} fps through {scene.codec}, {low:g}-{high:g} ms late"
+        + (f", dates ± {arguments.date_jitter_ms:g} ms" if arguments.date_jitter_ms else "")
     )
     flights: list[tuple[TrackingFigures, TrackingTrace]] = []
-    for hand in arguments.hands:
-        flight = replace(scene, hand=hand, seed=arguments.seed)
+    for hand, around in product(arguments.hands, arguments.around or [None]):
+        flight = replace(
+            scene, hand=hand, seed=arguments.seed, around=FLOWN[around] if around else None
+        )
         cpu = clock.process_cpu()
         trace = _fly(VirtualTimeSimulation(robot_file, config, flight), arguments.seconds, hand)
         flights.append((result_of(trace, flight, clock.process_cpu() - cpu), trace))
@@ -167,6 +181,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=seed_number, default=1)
     parser.add_argument("--latency-ms", nargs=2, type=number(0.0, 400.0), default=(60.0, 120.0))
     parser.add_argument("--fps", type=number(1.0, 1000.0), default=30.0)
+    parser.add_argument(
+        "--date-jitter-ms",
+        type=number(0.0, 30.0),
+        default=0.0,
+        help="standard deviation of what each picture's date is off by",
+    )
     parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
     parser.add_argument(
         "--hide",
@@ -175,6 +195,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar=("FROM_S", "TO_S"),
         help="from when to when LEDs can't be seen, and which (all, if none is named); repeatable",
+    )
+    parser.add_argument(
+        "--around",
+        nargs="+",
+        choices=FLOWN,
+        metavar="SCENE",
+        help=f"what stands and shines around the robot, whose body is drawn: {', '.join(FLOWN)}; "
+        "default: LEDs before an empty wall",
     )
     parser.add_argument("--live", action="store_true", help="in real time, through real processes")
     parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")

@@ -20,6 +20,8 @@ SETTLE_S = 2.0
 class TrackingFigures:
     """Figures of one flight; lengths in mm, angles in degrees."""
 
+    around: str
+    """Scene in which it was flown; "": LEDs before an empty wall."""
     hand: str
     seed: int
     tracked_s: float
@@ -47,6 +49,7 @@ def result_of(
     distance = np.linalg.norm(errors, axis=1)
     steps = np.diff(rows_of(trace.thrusts)[skip:], axis=0)
     return TrackingFigures(
+        around=scene.around.name if scene.around is not None else "",
         hand=scene.hand,
         seed=scene.seed,
         tracked_s=round(PERIOD_S * len(errors), 2),

@@ -11,6 +11,7 @@ import numpy as np
 from hardware.robot_file import RobotFile
 from hardware.sim.glass_film import film
 from hardware.sim.hand import Hand
+from hardware.sim.phone import BodyHistory
 from pipeline.camera.lens import Camera
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array, R_from_rpy
@@ -142,7 +143,7 @@ class ScreenSimulation(VirtualTimeSimulation):
         if look.seen is not None:
             self.robot_of_light.add_seen(look.seen, look.lights_in_c, self.t)
 
-    def _film(self, camera: Camera, t: float, rng: np.random.Generator) -> Image:
+    def _film(self, camera: Camera, t: float, _: BodyHistory, rng: np.random.Generator) -> Image:
         """A picture of the glass taken at `t` [s]."""
         R_fg = R_from_rpy(np.array([0.0, -self._display.tilt_rad, 0.0]))
 

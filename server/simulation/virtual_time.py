@@ -23,6 +23,8 @@ from hardware.sim.phone import EventKind, PhoneClock, PhoneOptions, VirtualPhone
 from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.reference_trajectory import Pose
 from hardware.sim.render import RenderOptions
+from hardware.sim.scenes.flown import FlownScene, seen_from
+from hardware.sim.scenes.scene import Scene
 from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.camera.extrinsics import IDENTITY, Extrinsics
@@ -78,6 +80,8 @@ class SimulationOptions:
     """... and whether the camera's file says it."""
     hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
     """From when to when [s] which LEDs can't be seen."""
+    around: Scene | None = None
+    """What stands and shines around the robot, whose body is drawn; None: LEDs, no more."""
     twin: bool = False
     """Another robot of the same kind flies beside, in rendered pictures."""
     twin_code: int | None = None
@@ -348,7 +352,7 @@ class VirtualTimeSimulation:
         clock, phone = self._ingest.clock, self._script.phone
         if not clock.ready:
             return
-        stamp = clock.local(phone.clock.at(t - phone.camera.extrinsics.time_offset_s))
+        stamp = clock.local(phone.clock.at(phone.dated(t)))
         stamp += self._frame_pipeline.camera.extrinsics.time_offset_s
         seen = eye.seen(t, stamp, self._robot_at)
         self.trace.pictures += 1
@@ -398,9 +402,12 @@ def make_script(
     if camera is None:
         camera = find_camera(DEVICE, scene.width, scene.height)
         camera = replace(camera, readout_s=scene.readout_s, extrinsics=scene.extrinsics)
+    start, around = robot_file.start, scene.around
+    if around is not None:
+        camera, start = seen_from(around, scene.seed, camera, start)
     phone = VirtualPhone(
         camera,
-        hand or make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
+        hand or make_hand(scene.hand, seed=scene.seed, start=start),
         robot_file.robot.leds_in_b,
         RenderOptions(),
         np.random.default_rng((scene.seed, 3)),
@@ -410,6 +417,8 @@ def make_script(
         if scene.twin
         else None,
     )
+    if around is not None:
+        phone.films = FlownScene(around, scene.seed, robot_file, phone).film
     size = camera.width, camera.height
     encoder = Encoder(*size, sensors.frame_rate_hz, scene.bitrate_bps, scene.codec)
     return PhoneScript(phone, encoder, operator or VirtualOperator())

@@ -21,6 +21,7 @@ from hardware.sim.hand import HANDS, REST_S, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
 from hardware.sim.phone_faults import SensorFault
 from hardware.sim.render import RenderOptions
+from hardware.sim.scenes.flown import FLOWN, FlownScene, seen_from
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.common import clock
@@ -54,17 +55,22 @@ def make_script(
         camera_fault_s=clock.now() + CAMERA_FAULT_S,
     )
     rest_s = REST_S if robot_file.start.lift == 0.0 else TAKE_OFF_S
+    around = FLOWN[arguments.around] if arguments.around else None
+    camera, start = find_camera(DEVICE, WIDTH, HEIGHT), robot_file.start
+    if around is not None:
+        camera, start = seen_from(around, arguments.seed, camera, start)
     hand = make_hand(
         arguments.hand,
         seed=arguments.seed,
-        start=robot_file.start,
+        start=start,
         p_robot_in_f=_robot_now(truth_port),
         t_start=clock.now(),
         rest_s=rest_s if arguments.rest is None else arguments.rest,
     )
     rng = np.random.default_rng(arguments.seed)
-    camera = find_camera(DEVICE, WIDTH, HEIGHT)
     phone = VirtualPhone(camera, hand, robot_file.robot.leds_in_b, RenderOptions(), rng, options)
+    if around is not None:
+        phone.films = FlownScene(around, arguments.seed, robot_file, phone).film
     encoder = Encoder(WIDTH, HEIGHT, arguments.fps, BITRATE_BPS, arguments.codec)
     return PhoneScript(phone, encoder, VirtualOperator())
 
@@ -142,6 +148,12 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
     parser.add_argument("--fps", type=number(1.0, 60.0), default=30.0, help="pictures a second")
+    parser.add_argument(
+        "--around",
+        choices=FLOWN,
+        metavar="SCENE",
+        help=f"what stands around the robot, whose body is drawn: {', '.join(FLOWN)}",
+    )
     faults = [fault.value for fault in SensorFault]
     parser.add_argument("--fault", choices=faults, default="none", help="of its motion sensors")
     lies = [fault.value for fault in CameraFault]

@@ -115,7 +115,7 @@ class PhoneScript:
         camera, angle = self.phone.camera, self.phone.options.screen_angle_deg
         codec = CODECS[self._encoder.codec]
         body = Picture(codec, key, camera.width, camera.height, angle, data)
-        return self._record(Kind.FRAME, t - camera.extrinsics.time_offset_s, body)
+        return self._record(Kind.FRAME, self.phone.dated(t), body)
 
     def touch(self, t: float) -> Record:
         """TOUCH at `t` [s]; call it every `TOUCH_S`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan2, ceil, radians
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -56,13 +57,23 @@ class Leaving:
         return rows
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PhoneAndRobotMotion:
-    """A phone in a hand and a robot, both smooth functions of time."""
+class Moving(Protocol):
+    """Something whose place is known at each time."""
 
-    hand: MovingHand
-    robot: MovingHand
-    twin: MovingHand | None = None
+    def pose(self, t: float, /) -> tuple[Array, Array]:
+        """Give its rotation (3, 3) and its place (3,) [m] in f at `t` [s]."""
+
+
+M = TypeVar("M", bound=Moving, covariant=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhoneAndRobotMotion(Generic[M]):
+    """A phone in a hand and a robot, both functions of time."""
+
+    hand: M
+    robot: M
+    twin: M | None = None
     """Another robot of the same kind."""
     quarters: int = 0
     """The axes c here are those of a sensor whose pictures are turned by so many, clockwise, until
@@ -79,7 +90,7 @@ class PhoneAndRobotMotion:
         return R_fc.T @ R_fb, R_fc.T @ (p_bf_in_f - p_cf_in_f)
 
 
-def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
+def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion[MovingHand]:
     """Phone before robot, as the scene's ranges say."""
     tilt = np.deg2rad(within(rng, scene.tilt_deg))
     way = rng.uniform(0.0, 2.0 * np.pi)
@@ -94,11 +105,11 @@ def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
     rpy_c = aim + np.array([0.0, atan2(above, ahead), atan2(-side, ahead)])
     place = np.array([-ahead, side, above])
     hand = MovingHand((*_parts(scene.motion, rng), tremor(rng)), place, rpy_c, 0.0)
-    return PhoneAndRobotMotion(hand, robot, _twin(scene, rng) if scene.twin else None)
+    return PhoneAndRobotMotion(hand, robot, twin_of(scene, rng) if scene.twin else None)
 
 
-def _twin(scene: Scene, rng: np.random.Generator) -> MovingHand:
-    """Beside the robot at the origin, turned and tilted as the scene's ranges say."""
+def twin_of(scene: Scene, rng: np.random.Generator) -> MovingHand:
+    """Another robot beside the one at the origin, turned and tilted as the scene's ranges say."""
     tilt, way = np.deg2rad(within(rng, scene.tilt_deg)), rng.uniform(0.0, 2.0 * np.pi)
     yaw = rng.choice((-1.0, 1.0)) * np.deg2rad(within(rng, scene.yaw_deg))
     side = rng.choice((-1.0, 1.0)) * within(rng, TWIN_M)
@@ -168,7 +179,7 @@ class Sensors:
 
     def __init__(
         self,
-        moving: PhoneAndRobotMotion,
+        moving: PhoneAndRobotMotion[MovingHand],
         phone_turn: Array,
         of_phone: np.random.Generator,
         of_body: np.random.Generator,

@@ -10,14 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.robot_file import load_robot
-from hardware.sim.body.shape import body_of
 from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.scenes.motion import FLAT_LEDS, START_S, Sensors, movers, within
-from hardware.sim.scenes.optics import Optics
-from hardware.sim.scenes.room import Room, bar_before, lights_around, mirror_near
 from hardware.sim.scenes.scene import HD, HONEST_S, VGA, ImageOrientation, Scene, Size
-from hardware.sim.scenes.sensor import BANK, Sensor
-from hardware.sim.scenes.stage import DrawnFrame, Stage
+from hardware.sim.scenes.sensor import BANK
+from hardware.sim.scenes.setting import optics_of, sensor_of, stage_of
+from hardware.sim.scenes.stage import DrawnFrame
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rotation_about_x
 from pipeline.signals import BodyImu, Image, PhoneImu
@@ -25,10 +23,7 @@ from pipeline.signals import BodyImu, Image, PhoneImu
 RATE_HZ = 30.0
 IMU_AHEAD_S = 0.03
 """Readings come sooner than pictures: those of so long after a picture are there before it."""
-MIN_LEDS = 4
-LED_RADIUS_M = 0.004
-GAMMA, CONTRAST = (2.0, 2.4), (0.0, 0.15)
-"""Every phone has its own tone curve, and nobody tells it."""
+MIN_LEDS = 4  # for a pose without a prior
 DISTORTION = np.array([0.05, -0.12, 0.0005, -0.0004, 0.02])
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 """Turns what is right and down clockwise."""
@@ -106,47 +101,23 @@ class RenderedVideo:
         self._sensor_camera = camera_of(size, within(rng, scene.readout_s))
         self.camera = self._sensor_camera.turned(scene.quarters)
         """As a calibration knows it."""
-        self.optics = Optics(
-            blur_px=float(rng.uniform(*scene.blur_px)),
-            halo=within(rng, scene.halo),
-            halo_px=within(rng, scene.halo_px) * size[1] / HD[1],
-            electrons=within(rng, scene.electrons),
-            read=within(rng, scene.read_noise),
-            exposure_s=within(rng, scene.exposure_s),
-            gamma=float(rng.uniform(*GAMMA)),
-            contrast=float(rng.uniform(*CONTRAST)),
-        )
+        self.optics = optics_of(scene, size[1], rng)
         self.moving = movers(scene, rng)
         self._sensed = replace(self.moving, quarters=scene.quarters)
-        self._stage = self._staged(rng)
-
-    def _staged(self, rng: np.random.Generator) -> Stage:
-        scene = self.scene
-        R_fc, p_cf_in_f = self.moving.hand.pose(START_S)
-        p_bf_in_f = self.moving.robot.pose(START_S)[1]
         n = len(self.leds_in_b)
-        first = self.seed + self.size[0] // VGA[0]  # each LED in its turn
-        covered = (first + np.arange(scene.covered) * (1 + self.seed % (n - 1))) % n
-        light = within(rng, scene.room_light)
-        lamps = int(rng.integers(scene.lamps[0], scene.lamps[1] + 1))
-        windows = int(rng.integers(scene.windows[0], scene.windows[1] + 1))
-        half, building = self.camera.half_field, np.random.default_rng(self._seeds[4])
-        led_light = within(rng, scene.led_light)
-        return Stage(
+        first = seed + size[0] // VGA[0]  # each LED in its turn
+        self._stage = stage_of(
+            scene,
+            self._sensed,
+            START_S,
             leds_in_b=self.leds_in_b,
-            led_radius_m=LED_RADIUS_M,
-            led_lights=led_light * rng.uniform(0.85, 1.15, n),
-            dark_from=START_S + scene.dark_after_s,
-            twin_lights=led_light * rng.uniform(0.85, 1.15, n if scene.twin else 0),
-            shown=~np.isin(np.arange(n), covered),
-            lights=lights_around(lamps, windows, R_fc, p_cf_in_f, half, rng),
-            mirror=mirror_near(p_bf_in_f, R_fc, rng) if scene.mirror else None,
-            bar=bar_before(p_bf_in_f, p_cf_in_f, light, rng) if scene.bar else None,
-            room=Room(self.size, light, scene.texture, self.optics.grey, rng),
-            R_fc_start=self._R_fc(START_S),
-            body=body_of(self.leds_in_b, load_robot("ames").plant, light, building)
-            if scene.has_body
-            else None,
+            plant=load_robot("ames").plant,
+            covered=(first + np.arange(scene.covered) * (1 + seed % (n - 1))) % n,
+            size=size,
+            half_field=self.camera.half_field,
+            optics=self.optics,
+            rng=rng,
+            building=np.random.default_rng(self._seeds[4]),
         )
 
     def __len__(self) -> int:
@@ -155,9 +126,8 @@ class RenderedVideo:
 
     def __iter__(self) -> Iterator[RenderedFrame]:
         """Shots in order of time, each drawn when asked for."""
-        camera, o = self._sensor_camera, self.optics
-        first, second = camera.delays(np.array([[0.0, 0.0], [0.0, 1.0]]))
-        sensor = Sensor(o, camera.width, camera.height, float(second - first))
+        camera = self._sensor_camera
+        sensor = sensor_of(self.optics, camera)
         grain = np.random.default_rng(self._seeds[1])
         turn = rotation_about_x(TURNS.get(self.scene.picture, 0.0))
         sensors = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:4]))

@@ -9,6 +9,7 @@ import pytest
 
 from hardware.camera_file import find_camera
 from hardware.codec import Encoder
+from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PERFECT, Event, EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import RenderOptions
@@ -20,6 +21,7 @@ from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import encode_message
 from server.protocol.wire import decode, encode
 from server.protocol.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
+from server.virtual_phone import command
 from server.virtual_phone.command import main, summary
 from server.virtual_phone.live_phone import EXPOSED_S, LivePhone, _first_failure, is_superseded
 from server.virtual_phone.phone_script import Manners, PhoneScript, TrackingMetrics, VirtualOperator
@@ -339,3 +341,15 @@ def test_a_turned_robot_scores_its_angle():
     score.advance(3.0, lambda _t: (exp(np.array([0.0, 0.0, 0.1])), np.zeros(3)))
     assert score.rms_rad == pytest.approx(0.1)
     assert score.rms_m == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("around", ["near_bloom", None])
+def test_the_command_puts_a_room_around_the_robot(around):
+    ames = load_robot("ames")
+    told = command.make_parser().parse_args(["--around", around] if around else [])
+    told.truth_port = 0
+    script = command.make_script(told, ames, 0)
+    x, y, _ = script.phone.hand.pose(0.0)[1]
+    distance, usual = float(np.hypot(x, y)), ames.start.distance
+    assert (script.phone.films is not None) == (around is not None)
+    assert (distance < 0.6 * usual) if around else (distance == pytest.approx(usual))
