@@ -28,13 +28,25 @@ def widened(
         beside: By how much (3,) in c [m], ...
         turned_in_b: ... and by what turn (3,) [rad].
     """
-    arms = leds_in_b[rays.led]
-    q = pose.p_bc_in_c + arms @ pose.R_cb.T
-    moved = beside + np.cross(turned_in_b, arms) @ pose.R_cb.T
-    off = (moved[:, 1:] - rays.tangents * moved[:, :1]) / q[:, :1]
-    shared = len(rays) * off[:, :, None] * off[:, None, :]
     both = np.concatenate((beside, turned_in_b))
     return (
         replace(pose, covariance=pose.covariance + np.outer(both, both)),
-        replace(rays, covariances=rays.covariances + shared),
+        widened_rays(pose.p_bc_in_c, pose.R_cb, rays, leds_in_b, beside, turned_in_b),
     )
+
+
+def widened_rays(
+    p_bc_in_c: Array,
+    R_cb: Array,
+    rays: LedRays,
+    leds_in_b: Array,
+    beside: Array,
+    turned_in_b: Array = NO_TURN,
+) -> LedRays:
+    """The same of the rays alone, of a robot at `p_bc_in_c` (3,) [m] and R_cb (3, 3)."""
+    arms = leds_in_b[rays.led]
+    q = p_bc_in_c + arms @ R_cb.T
+    moved = beside + np.cross(turned_in_b, arms) @ R_cb.T
+    off = (moved[:, 1:] - rays.tangents * moved[:, :1]) / q[:, :1]
+    shared = len(rays) * off[:, :, None] * off[:, None, :]
+    return replace(rays, covariances=rays.covariances + shared)

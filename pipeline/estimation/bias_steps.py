@@ -34,8 +34,8 @@ STEPPED: Final = 2.0
 """Times what it may be at a start, and nobody who walks or trembles makes it seem so."""
 AGAIN_S: Final = 3.0
 """Moved again so soon, it did not step: it walks."""
-FADE_S: Final = 5.0
-"""In which a walk that shows no more is forgotten."""
+FADE_S, QUICKLY = 5.0, 10.0
+"""In which a walk is forgotten, and so many times sooner if it shows no more."""
 ROUNDING: Final = 1e-18
 """No variance that pictures take from a bias is told from nothing below it [unit²]."""
 NOWHERE: Final = np.zeros(4)
@@ -67,7 +67,7 @@ class BiasSteps:
         Gives by how much (4,) each sensor's bias must be off, about each axis [unit].
         """
         keep = exp(min(self._t - t, 0.0) / MEMORY_S)
-        self.walks *= exp(min(self._t - t, 0.0) / FADE_S)
+        dt, walked = max(t - self._t, 0.0), self.walks.copy()
         self._t = max(t, self._t)
         solved = np.linalg.solve(S, np.column_stack((P[:6, BIASES:OFFSET], e)))
         surprise = float(e @ solved[:, 12]) / 6.0
@@ -85,6 +85,9 @@ class BiasSteps:
             * (self._shift * _solve(self._variance, self._shift)).sum(axis=1)
             / 3.0
         )
+        # a walk that was believed too large draws corrections that are too small for it
+        calm = np.clip(1.0 - chi2, 0.0, 1.0) * (QUICKLY - 1.0)
+        self.walks = walked * np.exp(-dt / FADE_S * (1.0 + calm))
         if not chi2.max() > SURPRISING:
             return NOWHERE
         by: Array = np.zeros(4)
@@ -92,7 +95,7 @@ class BiasSteps:
             by[k] = self._moved(k, after[k])
             since = t - self.t_moved[k]
             if 0.0 < since < AGAIN_S:
-                self.walks[k] = max(self.walks[k], by[k] * by[k] / since)
+                self.walks[k] = max(self.walks[k], by[k] * by[k] / max(since, MEMORY_S))
             self.t_moved[k] = t
             if FARTHEST * by[k] > STEPPED * self._most[k]:
                 self.t_stepped[k] = t

@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
 from pipeline.estimation.aliased_tone import AliasedTone
 from pipeline.estimation.bias_steps import BiasSteps
+from pipeline.estimation.date_noise import DateNoise
 from pipeline.estimation.estimator import MAX_SLEEP_S, Fusion, Health
 from pipeline.estimation.misdated_picture import STUMBLE_S, MisdatedPictures
 from pipeline.estimation.out_of_sequence import Checkpoint
@@ -87,6 +88,7 @@ class RelativeFilter:
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
         self._offset = OffsetMonitor()
         self._adaptive_noise, self._spot_noise = AdaptiveNoise(), SpotNoise()
+        self._date_noise = DateNoise()
         self._bias_steps, self._misdated = BiasSteps(self._initial), MisdatedPictures()
         self._off, self._aliased = Tones(PICTURES), AliasedTone()
 
@@ -165,14 +167,18 @@ class RelativeFilter:
         """
         variance = float(self._track.newest.P[OFFSET, OFFSET])
         dated = variance < DATED_S**2
+        track, passing = self._track, self._track.passing(predicted)
         if seen.pose is None or not dated or not can_start(seen, self._config):
-            return seen, 1.0
-        track, C = self._track, seen.pose.covariance
+            return self._by_its_date(seen, predicted, passing), 1.0
         e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
+        if variance < ONE_DATE_S**2:
+            self._date_noise.learn(e, P + seen.pose.covariance, passing)
+        seen = self._by_its_date(seen, predicted, passing)
+        assert seen.pose is not None
+        C = seen.pose.covariance
         self._off.add(seen.t, e[3:], e[:3])
         self._aliased.miss(seen.t, e, walks=bool(self._bias_steps.walks.any()))
         if variance < ONE_DATE_S**2:
-            passing = track.passing(predicted)
             misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
             if misdated is not None:
                 return misdated, 1.0
@@ -190,6 +196,11 @@ class RelativeFilter:
         inflation = self._adaptive_noise.judge(e, P, C)
         track.doubt_phone(self._adaptive_noise.factor)
         return seen, inflation
+
+    def _by_its_date(
+        self, seen: VisionMeasurement, at: Checkpoint[VisionMeasurement], passing: Array
+    ) -> VisionMeasurement:
+        return self._date_noise.doubted(seen, self._leds_in_b, at.x[0:3], at.R, passing)
 
     def _fuse(
         self, seen: VisionMeasurement, here: Checkpoint[VisionMeasurement], now: float
@@ -222,6 +233,9 @@ class RelativeFilter:
         sigma = float(np.sqrt(newest.P[OFFSET, OFFSET]))
         if self._offset.must_begin_again(float(newest.x[X_OFFSET]), sigma, seen.t):
             self._t_start = seen.t  # nothing learnt at a wrong time is worth keeping
+            self._bias_steps, self._adaptive_noise = BiasSteps(self._initial), AdaptiveNoise()
+            self._track.walk(self._bias_steps.walks)
+            self._track.doubt_phone(1.0)
             return self._start(seen, now)
         return Fusion.FUSED if used else Fusion.GATED
 
