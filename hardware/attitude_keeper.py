@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.config import HoldConfig
 from pipeline.frames import Array, cross
-from pipeline.robot import Robot
+from pipeline.robot import Robot, lift_mixer
 
 DRAWN_PER_S, DRAWN_AT_REST_PER_S = 0.2, 2.0
 """Share of the difference between vertical and accelerometer that is taken away each second."""
@@ -43,7 +43,7 @@ class AttitudeGains:
     @classmethod
     def of(cls, robot: Robot, config: HoldConfig) -> AttitudeGains:
         """Gains for a robot that can be lifted and turned, as stiff as control's own hold."""
-        columns: Array = np.linalg.pinv(robot.A[2:]).astype(float)
+        columns = lift_mixer(robot.A)
         stiffness = columns[:, 1:] * (config.stiffness * robot.inertia)
         damping = columns[:, 1:] * (config.damping * robot.inertia)
         return cls(robot.A[2], columns[:, 0], np.hstack((stiffness, -damping)), robot.f_max)

@@ -23,6 +23,8 @@ class GivenAttitude:
         self.commanded = np.zeros(4)
         """By the last command."""
         self._drive, self._lift = drive, GivenThrusts(1, most, max_rise, ramp_us, None)
+        self.fading = self._lift.fading
+        """Level from a silence on, and the thrust falls."""
 
     def __bool__(self) -> bool:
         """Whether there is any thrust."""
@@ -41,16 +43,8 @@ class GivenAttitude:
 
     def at(self, now_us: int) -> Array:
         """What to give now (4,)."""
-        leans = max(0.0, 1.0 - self._lift.fades_us(now_us) / TO_MEAN_US) * self.commanded
+        leans = max(0.0, 1.0 - self.fading.elapsed_us(now_us) / TO_MEAN_US) * self.commanded
         return np.concatenate((leans[: LIFT.start], self._lift.at(now_us)))
-
-    def fade(self, since_us: int) -> None:
-        """Go level, and let the thrust fall to zero within the ramp's time."""
-        self._lift.fade(since_us)
-
-    def has_faded(self, now_us: int) -> bool:
-        """Whether the ramp is over."""
-        return self._lift.has_faded(now_us)
 
     def follow(self, told: Array, now_us: int) -> None:
         """Give what is commanded; after a silence the thrust goes there by the rise allowed."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware.attitude_keeper import AttitudeKeeper
+from hardware.fading import Fading
 from hardware.follower import ROUNDING
 from pipeline.frames import Array
 
@@ -33,8 +34,13 @@ class GivenThrusts:
         self._mean, self._averaged = np.zeros(thrusters), 0
         """Of what was given lately, and of how many since thrust began, if not of more."""
         self._f_max, self._max_rise = f_max, max_rise
-        self._ramp_us, self._keeper = ramp_us, keeper
-        self._fading_since_us: int | None = None
+        self._keeper = keeper
+        self.fading = Fading(ramp_us)
+        """Begins with a silence, and ends with the next command.
+
+        From the mean: the last command may be the whole force that was to end a fast motion, and
+        held for long it begins another one.
+        """
         self._catching_up = False
 
     def __bool__(self) -> bool:
@@ -52,37 +58,17 @@ class GivenThrusts:
 
     def at(self, now_us: int) -> Array:
         """Thrusts to give now (m,) [N]."""
-        if self._fading_since_us is None:
+        if not self.fading:
             return self._base.copy()
-        elapsed_us = self.fades_us(now_us)
-        last = max(0.0, 1.0 - elapsed_us / TO_MEAN_US)
-        kept = self._mean + last * (self._base - self._mean)
-        faded = kept * max(0.0, 1.0 - elapsed_us / self._ramp_us)
+        last = max(0.0, 1.0 - self.fading.elapsed_us(now_us) / TO_MEAN_US)
+        faded = (self._mean + last * (self._base - self._mean)) * self.fading.left(now_us)
         return faded if self._keeper is None else self._keeper.thrusts(faded)
-
-    def fade(self, since_us: int) -> None:
-        """Fall linearly to zero within the ramp's time, a robot that flies upright.
-
-        From the mean: the last command may be the whole force that was to end a fast motion, and
-        held for long it begins another one.
-        """
-        if self._fading_since_us is None:
-            self._fading_since_us = since_us
-
-    def fades_us(self, now_us: int) -> int:
-        """For how long it has been fading; 0 while it follows."""
-        return 0 if self._fading_since_us is None else max(0, now_us - self._fading_since_us)
-
-    def has_faded(self, now_us: int) -> bool:
-        """Whether the ramp is over."""
-        since_us = self._fading_since_us
-        return since_us is not None and now_us - since_us >= self._ramp_us
 
     def follow(self, thrusts: Array, now_us: int) -> None:
         """Give what is commanded; after a silence, go there by steps of the rise allowed."""
-        if self._fading_since_us is not None:
+        if self.fading:
             self._base, self._catching_up = self.at(now_us), True
-            self._fading_since_us = None
+            self.fading.end()
         near = self._base - self._max_rise, self._base + self._max_rise
         self._catching_up = self._catching_up and bool(thrusts.any())
         self._base = np.clip(thrusts, *near) if self._catching_up else thrusts.copy()
@@ -99,4 +85,5 @@ class GivenThrusts:
         self.commanded = np.zeros_like(self.commanded)
         self._base, self._mean = np.zeros_like(self._base), np.zeros_like(self._mean)
         self._averaged = 0
-        self._fading_since_us, self._catching_up = None, False
+        self.fading.end()
+        self._catching_up = False

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hardware.fading import Fading
 from hardware.follower import ROUNDING
 from pipeline.config import PERIOD_S
 from pipeline.frames import Array
@@ -25,8 +26,9 @@ class GivenTwist:
         self.commanded = np.zeros(6)
         """By the last command."""
         self._base = np.zeros(6)
-        self._drive, self._ramp_us = drive, round(1e6 * drive.stop_s)
-        self._fading_since_us: int | None = None
+        self._drive = drive
+        self.fading = Fading(round(1e6 * drive.stop_s))
+        """Brakes from a silence on, until the next command."""
         self._catching_up = False
 
     def __bool__(self) -> bool:
@@ -47,27 +49,13 @@ class GivenTwist:
 
     def at(self, now_us: int) -> Array:
         """Twist to give now (6,)."""
-        if self._fading_since_us is None:
-            return self._base.copy()
-        elapsed_us = max(0, now_us - self._fading_since_us)
-        faded: Array = self._base * max(0.0, 1.0 - elapsed_us / self._ramp_us)
-        return faded
-
-    def fade(self, since_us: int) -> None:
-        """Brake to zero."""
-        if self._fading_since_us is None:
-            self._fading_since_us = since_us
-
-    def has_faded(self, now_us: int) -> bool:
-        """Whether it has come to zero."""
-        since_us = self._fading_since_us
-        return since_us is not None and now_us - since_us >= self._ramp_us
+        return self._base * self.fading.left(now_us) if self.fading else self._base.copy()
 
     def follow(self, twist_in_b: Array, now_us: int) -> None:
         """Give what is commanded; after a silence, go there by steps of the change allowed."""
-        if self._fading_since_us is not None:
+        if self.fading:
             self._base, self._catching_up = self.at(now_us), True
-            self._fading_since_us = None
+            self.fading.end()
         self._catching_up = self._catching_up and bool(twist_in_b.any())
         if self._catching_up:
             self._base = self._drive.toward(self._base, twist_in_b, PERIOD_S)
@@ -79,4 +67,5 @@ class GivenTwist:
     def zero(self) -> None:
         """Give zero at once."""
         self.commanded, self._base = np.zeros(6), np.zeros(6)
-        self._fading_since_us, self._catching_up = None, False
+        self.fading.end()
+        self._catching_up = False

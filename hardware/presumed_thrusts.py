@@ -6,7 +6,7 @@ import numpy as np
 
 from hardware.follower import LIFT
 from pipeline.frames import Array
-from pipeline.robot import Robot
+from pipeline.robot import Robot, lift_mixer
 
 
 class PresumedThrusts:
@@ -14,8 +14,7 @@ class PresumedThrusts:
 
     def __init__(self, robot: Robot) -> None:
         """Of a robot that takes attitude and thrust: told nothing."""
-        columns: Array = np.linalg.pinv(robot.A[2:]).astype(float)
-        self._each, self._f_max = columns[:, 0], robot.f_max
+        self._each, self._f_max = lift_mixer(robot.A)[:, 0], robot.f_max
         self._lift = 0.0
 
     def tell(self, told: Array, _now: float) -> None:

@@ -203,3 +203,8 @@ class Robot:
     def loop_axes(self) -> npt.NDArray[np.bool_]:
         """(6,) which axes' loops control closes, roll and pitch of one that tilts among them."""
         return self.axes if self.attitude is not None else self.axes | self.wrench_axes
+
+
+def lift_mixer(A: Array) -> Array:
+    """(m, 4) the least thrusts per lift [N] along b's z axis and torque [N m], by A (6, m)."""
+    return np.linalg.pinv(A[2:]).astype(np.float64)

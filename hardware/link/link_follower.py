@@ -6,7 +6,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from hardware.follower import FollowerError, RobotCommand
+from hardware.follower import (
+    BlinkOrder,
+    BodySample,
+    FollowerError,
+    RobotCommand,
+    RobotHealth,
+)
+from hardware.link.control_end import ControlEnd
 
 STOP_REPEATS = 5
 """Nobody hears whether it has come: on a line that loses half, one in 32 is not heard."""
@@ -67,3 +74,44 @@ class LinkFollower(ABC, Generic[End]):
     @abstractmethod
     def _send(self, command: RobotCommand) -> None:
         """Send it, or count it as `lost`."""
+
+
+class DatagramFollower(LinkFollower[ControlEnd]):
+    """One by our own link, but for how datagrams go and come."""
+
+    def __init__(self, end: ControlEnd, clock: Callable[[], float]) -> None:
+        """Open."""
+        super().__init__(end, clock)
+        self.thrusters = end.thrusters
+
+    @property
+    def health(self) -> tuple[RobotHealth, float] | None:
+        """See `TellsHealth`."""
+        return self._end.health
+
+    def receive(self) -> list[BodySample]:
+        """Return what has arrived. See `Follower`."""
+        self._check_open()
+        samples = (self._end.receive(data, self._clock()) for data in self._arrived())
+        return [sample for sample in samples if sample is not None]
+
+    def blink(self, order: BlinkOrder) -> None:
+        """See `Blinking`."""
+        self._check_open()
+        self._post(self._end.blink(order))
+
+    def use_tool(self, opening: float) -> None:
+        """See `HasTool`."""
+        self._check_open()
+        self._post(self._end.tool(opening))
+
+    def _send(self, command: RobotCommand) -> None:
+        self._post(self._end.command(command, self._clock()))
+
+    @abstractmethod
+    def _post(self, data: bytes) -> None:
+        """Send a datagram, or count it as `lost`."""
+
+    @abstractmethod
+    def _arrived(self) -> list[bytes]:
+        """Take what has come."""

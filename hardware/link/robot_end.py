@@ -314,18 +314,18 @@ class RobotEnd:
         following = self.state in (FollowerState.IDLE, FollowerState.RUNNING)
         if following and silence_us > limits.silence_us:
             self.state, self.refusal = FollowerState.COAST, Refusal.SILENT
-            self._given.fade(self._taken_us + limits.silence_us)
+            self._given.fading.begin(self._taken_us + limits.silence_us)
         coast_us = limits.ramp_after_us if self._given else limits.back_until_us
         if self.state == FollowerState.COAST and silence_us > coast_us:
             self._leave(now_us)
-        if self.state == FollowerState.RAMP and self._given.has_faded(now_us):
+        if self.state == FollowerState.RAMP and self._given.fading.is_over(now_us):
             self._refuse()
 
     def _leave(self, now_us: int) -> None:
         """Ramp down, or go on to; at once if there is no thrust."""
         if self._given:
             self.state, self.refusal = FollowerState.RAMP, Refusal.SILENT
-            self._given.fade(now_us)
+            self._given.fading.begin(now_us)
         else:
             self._refuse()
 

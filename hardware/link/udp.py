@@ -25,17 +25,17 @@ import socket
 import time
 from collections.abc import Callable
 
-from hardware.follower import BlinkOrder, BodySample, FollowerError, RobotCommand, RobotHealth
+from hardware.follower import FollowerError
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import MAX_BYTES
-from hardware.link.link_follower import LinkFollower
+from hardware.link.link_follower import DatagramFollower
 from hardware.robot_file import RobotFile
 
 MAX_SAMPLES = 256
 """Taken at once; the rest waits for the next call."""
 
 
-class UdpFollower(LinkFollower[ControlEnd]):
+class UdpFollower(DatagramFollower):
     """A robot at the other end of the network."""
 
     def __init__(
@@ -51,7 +51,6 @@ class UdpFollower(LinkFollower[ControlEnd]):
             FollowerError: no such host.
         """
         super().__init__(end, clock)
-        self.thrusters = end.thrusters
         try:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
         except OSError as error:
@@ -64,34 +63,10 @@ class UdpFollower(LinkFollower[ControlEnd]):
         self._socket.setblocking(False)
         self._socket.connect(address)  # from here on the kernel drops whatever others send
 
-    @property
-    def health(self) -> tuple[RobotHealth, float] | None:
-        """See `TellsHealth`."""
-        return self._end.health
-
-    def receive(self) -> list[BodySample]:
-        """Return what has arrived. See `Follower`."""
-        self._check_open()
-        samples = (self._end.receive(data, self._clock()) for data in self._arrived())
-        return [sample for sample in samples if sample is not None]
-
     def close(self) -> None:
         """Close. See `Follower`."""
         self._closed = True
         self._socket.close()
-
-    def blink(self, order: BlinkOrder) -> None:
-        """See `Blinking`."""
-        self._check_open()
-        self._post(self._end.blink(order))
-
-    def use_tool(self, opening: float) -> None:
-        """See `HasTool`."""
-        self._check_open()
-        self._post(self._end.tool(opening))
-
-    def _send(self, command: RobotCommand) -> None:
-        self._post(self._end.command(command, self._clock()))
 
     def _post(self, data: bytes) -> None:
         try:

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hardware.follower import (
-    BlinkOrder,
-    BodySample,
-    EStop,
-    FollowerState,
-    RobotCommand,
-    RobotHealth,
-)
+from hardware.follower import EStop, FollowerState
 from hardware.link.blink_end import NO_LED
 from hardware.link.control_end import ControlEnd
-from hardware.link.link_follower import LinkFollower
+from hardware.link.link_follower import DatagramFollower
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.battery import DrainingBattery
@@ -33,7 +26,7 @@ def whole(data: bytes) -> Sequence[bytes]:
     return (data,)
 
 
-class VirtualTimeFollower(LinkFollower[ControlEnd]):
+class VirtualTimeFollower(DatagramFollower):
     """The same bytes, gate, watchdog and plant as over UDP; time passes only in `advance`."""
 
     def __init__(
@@ -51,7 +44,6 @@ class VirtualTimeFollower(LinkFollower[ControlEnd]):
         self._now_us = 0
         end = ControlEnd.of(robot_file, KEY, epoch, seeded_nonces(seed + 1))
         super().__init__(end, lambda: self.t)
-        self.thrusters = self._end.thrusters
         self.connected = True
         """False: the link loses everything, both ways."""
         self.to_robot: Tamper = whole
@@ -59,7 +51,7 @@ class VirtualTimeFollower(LinkFollower[ControlEnd]):
         self.to_control: Tamper = whole
         """... and of a sample's."""
         self._robot_file = robot_file
-        self._arrived: list[bytes] = []
+        self._inbox: list[bytes] = []
 
     @property
     def plant(self) -> Plant:
@@ -70,11 +62,6 @@ class VirtualTimeFollower(LinkFollower[ControlEnd]):
     def body(self) -> SimulatedBody:
         """The truth of any robot."""
         return self._robot.body
-
-    @property
-    def health(self) -> tuple[RobotHealth, float] | None:
-        """See `TellsHealth`."""
-        return self._end.health
 
     @property
     def t(self) -> float:
@@ -105,31 +92,15 @@ class VirtualTimeFollower(LinkFollower[ControlEnd]):
             self._now_us += TICK_US
             said = self._robot.tick(self._now_us)
             if self.connected and self._robot.end.recipients(self._now_us):
-                self._arrived += (one for data in said for one in self.to_control(data))
-
-    def receive(self) -> list[BodySample]:
-        """Return what has arrived. See `Follower`."""
-        self._check_open()
-        arrived, self._arrived = self._arrived, []
-        samples = (self._end.receive(data, self._clock()) for data in arrived)
-        return [sample for sample in samples if sample is not None]
-
-    def blink(self, order: BlinkOrder) -> None:
-        """See `Blinking`."""
-        self._check_open()
-        self._post(self._end.blink(order))
-
-    def use_tool(self, opening: float) -> None:
-        """See `HasTool`."""
-        self._check_open()
-        self._post(self._end.tool(opening))
+                self._inbox += (one for data in said for one in self.to_control(data))
 
     def close(self) -> None:
         """Close. See `Follower`."""
         self._closed = True
 
-    def _send(self, command: RobotCommand) -> None:
-        self._post(self._end.command(command, self._clock()))
+    def _arrived(self) -> list[bytes]:
+        arrived, self._inbox = self._inbox, []
+        return arrived
 
     def _post(self, data: bytes) -> None:
         if self.connected:

@@ -12,7 +12,7 @@ from math import exp
 import numpy as np
 
 from pipeline.estimation.estimator import Fusion, Health
-from pipeline.estimation.sanity import are_finite, is_pose
+from pipeline.estimation.sanity import is_imu_sample, is_pose
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import Array, cross, log
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
@@ -42,14 +42,14 @@ class NoFilter:
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember the newest."""
-        if not _is_sample(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c):
+        if not is_imu_sample(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c):
             self.samples_invalid += 1
         elif self._phone is None or sample.t > self._phone.t:
             self._phone = sample
 
     def add_body_imu(self, sample: BodyImu) -> None:
         """Remember the newest force, for whoever asks for it; of no use here."""
-        if not _is_sample(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b):
+        if not is_imu_sample(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b):
             self.samples_invalid += 1
         elif self._body is None or sample.t > self._body.t:
             self._body = sample
@@ -138,7 +138,3 @@ class NoFilter:
         fused = sum(count for fusion, count in self.poses.items() if fusion)
         dropped = self.poses.total() - fused
         return Health(fused=fused, dropped=dropped, late=self.poses[Fusion.LATE])
-
-
-def _is_sample(t: float, rate: Array, force: Array) -> bool:
-    return rate.shape == force.shape == (3,) and are_finite(t, rate, force)

@@ -206,7 +206,7 @@ class FirmwareFollower(VirtualTimeFollower):
         self._line.write(self.computer.tick(self._now_us))
         samples = self.computer.feed(self._line.read(), self._now_us)
         if self.connected and self.computer.end.recipients(self._now_us):
-            self._arrived += samples
+            self._inbox += samples
 
     def close(self) -> None:
         super().close()

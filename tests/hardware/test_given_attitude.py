@@ -27,21 +27,21 @@ def test_it_gives_what_it_is_told():
 
 def test_silence_is_level_and_straight_within_a_tenth_of_a_second_and_the_thrust_fades_slowly():
     given, now_us = given_after(*[LEADS] * 3)
-    given.fade(now_us)
+    given.fading.begin(now_us)
     half = given.at(now_us + TO_MEAN_US // 2)
     np.testing.assert_allclose(half[:3], 0.5 * LEADS[:3])
     late = given.at(now_us + TO_MEAN_US)
     np.testing.assert_array_equal(late[:3], np.zeros(3))
     assert late[3] == pytest.approx((1.0 - TO_MEAN_US / RAMP_US) * 12.0)
-    assert not given.has_faded(now_us + RAMP_US - 1)
-    assert given.has_faded(now_us + RAMP_US)
+    assert not given.fading.is_over(now_us + RAMP_US - 1)
+    assert given.fading.is_over(now_us + RAMP_US)
     np.testing.assert_array_equal(given.at(now_us + RAMP_US), np.zeros(4))
 
 
 def test_a_second_silence_begins_no_new_one_and_a_command_ends_it():
     given, now_us = given_after(LEADS)
-    given.fade(now_us)
-    given.fade(now_us + TO_MEAN_US)
+    given.fading.begin(now_us)
+    given.fading.begin(now_us + TO_MEAN_US)
     assert not given.at(now_us + TO_MEAN_US)[:3].any()
     given.follow(LEADS, now_us + TO_MEAN_US)
     np.testing.assert_array_equal(given.at(now_us + 2 * TO_MEAN_US), LEADS)
@@ -49,7 +49,7 @@ def test_a_second_silence_begins_no_new_one_and_a_command_ends_it():
 
 def test_after_a_silence_the_thrust_goes_back_by_the_rise_that_is_allowed():
     given, now_us = given_after(*[(0.0, 0.0, 0.0, 20.0)] * 3)
-    given.fade(now_us)
+    given.fading.begin(now_us)
     faded = given.at(now_us + RAMP_US - 1)[3]
     given.follow(np.array([0.0, 0.0, 0.0, 20.0]), now_us + RAMP_US - 1)
     assert given.at(now_us + RAMP_US)[3] == pytest.approx(faded + 8.0)

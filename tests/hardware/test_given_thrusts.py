@@ -21,7 +21,7 @@ def test_silence_goes_over_to_the_mean_of_what_was_given_lately(before):
     """The last command damps a motion that ends meanwhile; held for long it begins another."""
     given, now_us = given_after((0.0, 0.0), *before, *SWINGING)
     np.testing.assert_array_equal(given.at(now_us), SWINGING[-1])
-    given.fade(now_us)
+    given.fading.begin(now_us)
     np.testing.assert_allclose(given.at(now_us), SWINGING[-1], atol=1e-12)
     weights = np.ones(MEAN_OF)
     if before:  # all the same there, so one stands for all
@@ -35,7 +35,7 @@ def test_silence_goes_over_to_the_mean_of_what_was_given_lately(before):
 
 def test_a_steady_thrust_is_its_own_mean_from_the_first_command_on():
     given, now_us = given_after((0.0, 0.0), *[(2.0, 0.5)] * 3)
-    given.fade(now_us)
+    given.fading.begin(now_us)
     np.testing.assert_array_equal(given.at(now_us + RAMP_US // 2), [1.0, 0.25])
 
 
@@ -44,7 +44,7 @@ def test_nothing_is_given_in_silence_after_zero_whatever_was_before(stop):
     given, _ = given_after(*SWINGING)
     stop(given)
     assert not given
-    given.fade(10**7)
+    given.fading.begin(10**7)
     for since_us in range(0, RAMP_US, 50_000):
         assert not given.at(10**7 + since_us).any()
 
@@ -53,7 +53,7 @@ def test_no_thruster_is_given_more_than_it_was_since_the_mean_began():
     rng = np.random.default_rng(1)
     commands = rng.uniform(0.0, 3.0, (400, 2))
     given, now_us = given_after(*commands)
-    given.fade(now_us)
+    given.fading.begin(now_us)
     for since_us in range(0, RAMP_US, 1_000):
         now = given.at(now_us + since_us)
         assert (now >= 0.0).all()

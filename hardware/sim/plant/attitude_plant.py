@@ -18,7 +18,7 @@ from hardware.plant_parameters import PlantParameters
 from hardware.robot_physics import allocation_matrix
 from hardware.sim.plant.plant import Plant, PlantOptions
 from pipeline.frames import Array, R_from_rpy, exp, log, rpy_from_R
-from pipeline.robot import AttitudeDrive
+from pipeline.robot import AttitudeDrive, lift_mixer
 
 QUICKER: Final = 4.0
 """Gain of the rates to that of the attitude: two equal lags, without overshoot."""
@@ -49,7 +49,7 @@ class AttitudePlant(Plant):
             parameters.thruster_directions_in_b,
             parameters.thruster_torques,
         )
-        self._mixer: Array = np.linalg.pinv(A[2:]).astype(float)
+        self._mixer = lift_mixer(A)
         self._attitude_gain = 1.0 / drive.lag_s
         self._rate_gains = np.array([*2 * (QUICKER / drive.lag_s,), 1.0 / drive.yaw_lag_s])
         self._thrust = 0.0

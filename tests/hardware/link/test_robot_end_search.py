@@ -62,7 +62,7 @@ class Ends:
     def key(self) -> tuple[object, ...]:
         """What is the same of two ends that nobody could tell apart."""
         end = self.python
-        silence_us, fading_us = self.now_us - end._taken_us, end._given._fading_since_us
+        silence_us = self.now_us - end._taken_us
         shaking_us = self.now_us - end._handshake_us
         return (
             end.state,
@@ -71,7 +71,7 @@ class Ends:
             bool(end._given),
             end._replaced,
             sum(silence_us > limit for limit in (60_000, 280_000, 400_000)),
-            fading_us is not None and self.now_us - fading_us >= LIMITS.ramp_us,
+            end._given.fading.is_over(self.now_us),
             end._epoch == 0,
             end._epoch == end._newest[0],
             end._candidate == end._newest[0],
