@@ -368,6 +368,7 @@ class RelativeFilter:
                 self._bias_steps.t_stepped,
                 self._track.body_noise,
                 self._spot_noise.factor,
+                self._date_noise.sigma_s,
                 of_body=self._motion is None,
             ),
         )

@@ -40,6 +40,8 @@ NOISY: Final = 4.0
 """Times the configured noise of a sample. Of the robot's alone: at 60 Hz a hand is as rough."""
 INEXACT: Final = 4.0
 """Times the variance that a picture tells of its LEDs: by chance it is 1.5 now and then."""
+MISDATED_S: Final = 0.003
+"""Standard deviation of one picture's date [s]: by chance it is 1 ms now and then."""
 
 
 def sensor_doubts(
@@ -52,6 +54,7 @@ def sensor_doubts(
     t_stepped: Array,
     noise: Array,
     spot_noise: float,
+    date_noise_s: float,
     *,
     of_body: bool = True,
 ) -> tuple[str, ...]:
@@ -67,6 +70,7 @@ def sensor_doubts(
         t_stepped: When its bias last stepped (4,) [s].
         noise: Of the robot's samples, by the configured (2,).
         spot_noise: Factor of the variances of LEDs' rays.
+        date_noise_s: Standard deviation of one picture's date [s].
         of_body: The robot has motion sensors on its body.
     """
     whose, or_else = (EITHER, "") if of_body else (THE_PHONE, OR_ELSE)
@@ -89,7 +93,8 @@ def sensor_doubts(
         if ratio > NOISY
     ]
     inexact = ["LEDs are seen much less exactly than usual."] if spot_noise > INEXACT else []
-    return (*clipped, *vibrating, *aliased, *swaying, *stepped, *noisy, *inexact)
+    misdated = ["Pictures are dated less exactly than usual."] if date_noise_s > MISDATED_S else []
+    return (*clipped, *vibrating, *aliased, *swaying, *stepped, *noisy, *inexact, *misdated)
 
 
 def aliased_tones(t: float, t_aliased: Array) -> tuple[str, ...]:

@@ -49,7 +49,8 @@ HEADINGS = (
 
 def table(results: Sequence[TrackingFigures]) -> str:
     """One line a flight."""
-    lines = text.table(HEADINGS, results).splitlines()
+    headings = HEADINGS if any(result.around for result in results) else HEADINGS[1:]
+    lines = text.table(headings, results).splitlines()
     ends = ["", *(f"  ended: {result.ended}" if result.ended else "" for result in results)]
     return "\n".join(line + end for line, end in zip(lines, ends, strict=True))
 

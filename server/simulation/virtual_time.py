@@ -83,7 +83,7 @@ class SimulationOptions:
     around: Scene | None = None
     """What stands and shines around the robot, whose body is drawn; None: LEDs, no more."""
     twin: bool = False
-    """Another robot of the same kind flies beside, in rendered pictures."""
+    """Another robot of the same kind flies beside, in pictures before an empty wall."""
     twin_code: int | None = None
     """What the LEDs of that one blink; None: they shine."""
     led_noise_px: float | None = None

@@ -101,6 +101,8 @@ def pictures(world: World) -> list[Event]:
     """Vision measurements; also those without any LED."""
     rng, i = world.rng(13), world.pictures.i
     stamps = world.phone_stamps(world.t[i]) - world.setup.time_offset
+    if world.setup.date_jitter > 0.0:
+        stamps = stamps + world.setup.date_jitter * world.rng(29).standard_normal(len(i))
     noise_px = world.setup.pixel_noise * NOISE_PX * rng.normal(size=(len(i), len(LEDS_IN_B), 2))
     wrong = rng.uniform(-OUTLIER_PX, OUTLIER_PX, noise_px.shape)
     true = tangents(world, i)

@@ -98,6 +98,8 @@ class WorldOptions:
     """Of the same, per second."""
     stamp_jitter: float = 0.0
     """σ of the stamps of the phone's IMU."""
+    date_jitter: float = 0.0
+    """σ of the pictures' stamps, each by its own [s]."""
     held: tuple[float, float] = (0.0, 0.0)
     """Shortest and longest time for which the phone's sensors say what they measured at its begin:
     a browser that is kept from work reads them late, and stamps what it read."""

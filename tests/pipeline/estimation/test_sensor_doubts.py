@@ -69,6 +69,7 @@ def test_a_shaken_phone_is_said_to_be_while_it_is_and_three_seconds_more() -> No
         ({"body_fault": ImuFault(noise=20.0)}, 0.0, "The robot's accelerometer is much noisier"),
         ({"body_fault": ImuFault(noise=20.0)}, 0.0, "The robot's gyroscope is much noisier"),
         ({"pixel_noise": 2.5}, 0.0, "LEDs are seen much less exactly"),
+        ({"date_jitter": 0.006}, 0.0, "Pictures are dated less exactly"),
         (
             {"body_fault": ImuFault(step=(0.0, 0.5), start=6.0)},
             6.0,

@@ -74,6 +74,7 @@ def test_no_sensors_that_it_does_not_have_are_learnt_or_blamed():
         np.full(4, 9.0),
         np.ones(2),
         1.0,
+        0.0,
     )
     said = sensor_doubts(*arguments, of_body=False)
     assert len(said) == 4

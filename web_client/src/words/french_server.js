@@ -235,6 +235,7 @@ export const SERVER = {
   "{} is moved beyond the end of its range.": "{} est poussé au-delà de sa plage.",
   "{} is much noisier than usual.": "{} est bien plus bruité que d’habitude.",
   "LEDs are seen much less exactly than usual.": "Les LED sont vues bien moins précisément que d’habitude.",
+  "Pictures are dated less exactly than usual.": "Les images sont datées moins exactement que d’habitude.",
   "The robot's motion sensors stand still.": "Les capteurs de mouvement du robot sont figés.",
   "The robot's accelerometer jumps: it feels gravity elsewhere than before.": "L’accéléromètre du robot saute : il sent la gravité ailleurs qu’avant.",
   "The phone falls or is shaken, or its accelerometer jumps.": "Le téléphone tombe ou est secoué, ou son accéléromètre saute.",
