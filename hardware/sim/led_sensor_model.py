@@ -38,7 +38,10 @@ class LedSensorModel:
         hidden: Callable[[float], Sequence[int]],
         rng: np.random.Generator,
     ) -> None:
-        """`noise_px`: standard deviation of an LED's place, each way; `hidden` as the phone's."""
+        """`leds_in_b` (n, 3) as the robot file has them [m]; where they are the phone knows.
+
+        `noise_px`: standard deviation of an LED's place, each way; `hidden` as the phone's.
+        """
         self._phone, self._leds_in_b, self._hidden = phone, leds_in_b, hidden
         self._noise_px, self._rng = noise_px, rng
         self._imus = ImuStreams()
@@ -52,7 +55,7 @@ class LedSensorModel:
         """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""
         camera, lies = self._phone.camera, self._phone.lies
         t, seen_by = lies.moment(t), lies.at(t)
-        middle = self._pixels_at(t, self._leds_in_b, body, seen_by)
+        middle = self._pixels_at(t, self._phone.leds_in_b, body, seen_by)
         pixels = self._rolled(middle, t, body, seen_by)
         shown = camera.sees(pixels)
         shown[list(self._hidden(t))] = False
@@ -79,7 +82,7 @@ class LedSensorModel:
         pixels, delays = middle.copy(), seen_by.delays(middle)
         for k in np.flatnonzero(np.isfinite(delays)):
             later = t + float(delays[k])
-            pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body, seen_by)[0]
+            pixels[k] = self._pixels_at(later, self._phone.leds_in_b[k : k + 1], body, seen_by)[0]
         return pixels
 
     def _pixels_at(self, t: float, leds_in_b: Array, body: BodyHistory, seen_by: Camera) -> Array:

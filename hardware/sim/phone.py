@@ -184,7 +184,9 @@ class VirtualPhone:
         """
         self.hidden, self._twin, self._twin_hidden = hidden, twin, twin_hidden
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
-        self._leds_in_b, self._look, self._body = leds_in_b, look, body
+        self._look, self._body = look, body
+        self.leds_in_b = leds_in_b
+        """(n, 3) where they truly are [m], whatever a robot file says."""
         schedule, self._sensor_rng, self._picture_rng, self._date_rng = rng.spawn(4)
         self.lies = FaultyCamera(
             options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
@@ -279,10 +281,10 @@ class VirtualPhone:
         if self.films is not None:
             image = self.films(seen_by, moment, body, self._picture_rng)
         else:
-            shown = np.delete(self._leds_in_b, list(self.hidden(moment)), axis=0)
+            shown = np.delete(self.leds_in_b, list(self.hidden(moment)), axis=0)
             others = []
             if self._twin is not None:
-                lit = np.delete(self._leds_in_b, list(self._twin_hidden(moment)), axis=0)
+                lit = np.delete(self.leds_in_b, list(self._twin_hidden(moment)), axis=0)
                 others.append((seen_as(self._twin), lit))
             image = render(
                 seen_by, seen_as(body), shown, self._look, self._picture_rng, self._body, others

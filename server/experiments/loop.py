@@ -100,6 +100,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
         latency_s=latency_s,
         frame_rate_hz=arguments.fps,
         sensors=sensors,
+        led_error_m=1e-3 * arguments.led_error_mm,
         codec=arguments.codec,
         hidden=hidden(arguments.hide, len(robot_file.robot.leds_in_b)),
     )
@@ -108,6 +109,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
         f"{cutoff_hz(config.virtual_camera):.2f} Hz, {scene.width}x{scene.height} at "
         f"{scene.frame_rate_hz:g} fps through {scene.codec}, {low:g}-{high:g} ms late"
         + (f", dates ± {arguments.date_jitter_ms:g} ms" if arguments.date_jitter_ms else "")
+        + (f", LEDs ± {arguments.led_error_mm:g} mm" if arguments.led_error_mm else "")
     )
     flights: list[tuple[TrackingFigures, TrackingTrace]] = []
     for hand, around in product(arguments.hands, arguments.around or [None]):
@@ -187,6 +189,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number(0.0, 30.0),
         default=0.0,
         help="standard deviation of what each picture's date is off by",
+    )
+    parser.add_argument(
+        "--led-error-mm",
+        type=number(0.0, 20.0),
+        default=0.0,
+        help="standard deviation of what the robot file has each LED's place wrong by, each axis",
     )
     parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
     parser.add_argument(

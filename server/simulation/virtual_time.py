@@ -86,6 +86,8 @@ class SimulationOptions:
     """Another robot of the same kind flies beside, in pictures before an empty wall."""
     twin_code: int | None = None
     """What the LEDs of that one blink; None: they shine."""
+    led_error_m: float = 0.0
+    """Standard deviation of what the robot file has each LED's place wrong by, each axis [m]."""
     led_noise_px: float | None = None
     """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
     camera: Camera | None = None
@@ -405,10 +407,11 @@ def make_script(
     start, around = robot_file.start, scene.around
     if around is not None:
         camera, start = seen_from(around, scene.seed, camera, start)
+    leds_in_b, placing = robot_file.robot.leds_in_b, np.random.default_rng((scene.seed, 17))
     phone = VirtualPhone(
         camera,
         hand or make_hand(scene.hand, seed=scene.seed, start=start),
-        robot_file.robot.leds_in_b,
+        leds_in_b + scene.led_error_m * placing.standard_normal(leds_in_b.shape),
         RenderOptions(),
         np.random.default_rng((scene.seed, 3)),
         sensors,

@@ -112,7 +112,7 @@ class FlownScene:
             self._scene,
             moving,
             t,
-            leds_in_b=self._robot_file.robot.leds_in_b,
+            leds_in_b=self._phone.leds_in_b,
             plant=self._robot_file.plant,
             covered=self._covered[: self._scene.covered],
             size=(self._phone.camera.width, self._phone.camera.height),

@@ -36,7 +36,7 @@ def phone_in(scene, seed=0, robot_file=AMES, hidden=lambda _: ()):
 def brightest(phone, luma, led, reach=3):
     """Grey level near where an LED is."""
     R_cb, p_bc_in_c = phone.relative_pose(0.1, still)
-    u, v = phone.camera.pixels((p_bc_in_c + R_cb @ phone._leds_in_b[led])[None])[0]
+    u, v = phone.camera.pixels((p_bc_in_c + R_cb @ phone.leds_in_b[led])[None])[0]
     u, v = round(u), round(v)
     return int(luma[v - reach : v + reach + 1, u - reach : u + reach + 1].max())
 
