@@ -67,12 +67,13 @@ class BiasSteps:
         Gives by how much (4,) each sensor's bias must be off, about each axis [unit].
         """
         keep = exp(min(self._t - t, 0.0) / MEMORY_S)
-        dt, walked = max(t - self._t, 0.0), self.walks.copy()
+        fading = max(t - self._t, 0.0) / FADE_S
         self._t = max(t, self._t)
         solved = np.linalg.solve(S, np.column_stack((P[:6, BIASES:OFFSET], e)))
         surprise = float(e @ solved[:, 12]) / 6.0
         cross = P[BIASES:OFFSET, :6]
         if not 0.0 < surprise < BEYOND:
+            self.walks *= exp(-fading)
             return NOWHERE
         shift = (cross @ solved[:, 12]).reshape(4, 3) * min(1.0, sqrt(SHARE / surprise))
         reduction = _by_sensor(cross @ solved[:, :12])
@@ -87,7 +88,7 @@ class BiasSteps:
         )
         # a walk that was believed too large draws corrections that are too small for it
         calm = np.clip(1.0 - chi2, 0.0, 1.0) * (QUICKLY - 1.0)
-        self.walks = walked * np.exp(-dt / FADE_S * (1.0 + calm))
+        self.walks *= np.exp(-fading * (1.0 + calm))
         if not chi2.max() > SURPRISING:
             return NOWHERE
         by: Array = np.zeros(4)

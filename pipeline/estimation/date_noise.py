@@ -16,7 +16,7 @@ counts against it.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, inf, log
+from math import exp, inf, isfinite, log
 from typing import Final
 
 import numpy as np
@@ -64,6 +64,8 @@ class DateNoise:
         if not information > 0.0:
             return
         late_s = float(passing @ solved[:, 0]) / information
+        if not isfinite(late_s):
+            return
         across = (float(e @ solved[:, 0]) - late_s * late_s * information) / (len(e) - 1.0)
         known = max(1.0, across) / information
         (before_s, known_before), self._before = self._before, (late_s, known)

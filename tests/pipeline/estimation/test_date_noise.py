@@ -14,13 +14,13 @@ S = np.diag(np.square([0.003, 0.0002, 0.0002, 0.0006, 0.0008, 0.0008]))
 FAST = np.array([0.05, 0.3, -0.2, 0.02, -0.05, 0.1])
 
 
-def learnt(jitter_s, pictures=300, stretch=1.0, passing=FAST, seed=0, dates=None):
+def learnt(jitter_s, pictures=300, stretch=1.0, passing=FAST, seed=0, dates=None, late_s=0.0):
     """What is made of pictures whose dates are off by so much, predicted `stretch` times worse."""
     rng, dates = np.random.default_rng(seed), dates or DateNoise()
     for _ in range(pictures):
         passes = passing * rng.uniform(0.2, 1.0)
         e = stretch * np.sqrt(np.diag(S)) * rng.standard_normal(6)
-        dates.learn(e + jitter_s * rng.standard_normal() * passes, S, passes)
+        dates.learn(e + (late_s + jitter_s * rng.standard_normal()) * passes, S, passes)
     return dates
 
 
@@ -42,6 +42,11 @@ def test_right_dates_are_believed():
     assert max(found) < 0.0012
 
 
+def test_what_all_pictures_are_late_by_is_the_time_offset_s():
+    found = [learnt(0.0, seed=seed, late_s=0.004).sigma_s for seed in range(10)]
+    assert max(found) < 0.0012
+
+
 def test_and_believed_again():
     dates = learnt(0.008)
     assert dates.sigma_s > 0.005
@@ -55,6 +60,15 @@ def test_what_is_off_in_all_directions_is_no_date():
 def test_who_stands_still_tells_nothing_of_dates():
     """What a camera is taken for that nobody knows is kept."""
     assert learnt(0.01, passing=1e-3 * FAST).sigma_s == pytest.approx(FIRST_S, rel=0.1)
+
+
+def test_what_is_no_number_teaches_nothing():
+    dates = learnt(0.004)
+    before = dates.sigma_s
+    dates.learn(np.full(6, np.nan), S, FAST)
+    dates.learn(np.zeros(6), np.full((6, 6), np.nan), FAST)
+    assert dates.sigma_s == before
+    assert learnt(0.008, dates=dates).sigma_s > before
 
 
 def test_a_picture_is_doubted_along_its_motion_alone():
