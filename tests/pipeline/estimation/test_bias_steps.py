@@ -6,7 +6,7 @@ import pytest
 from hardware.sim.world import evaluator
 from hardware.sim.world.sensor_faults import ImuFault
 from hardware.sim.world.world import World, WorldOptions
-from pipeline.estimation.bias_steps import AGAIN_S, FADE_S, BiasSteps
+from pipeline.estimation.bias_steps import AGAIN_S, FADE_S, MEMORY_S, BiasSteps
 from pipeline.estimation.relative_kernels import BIASES, N
 from tests.pipeline.flight import new
 
@@ -72,6 +72,26 @@ def test_a_bias_that_moves_again_and_again_walks_until_it_shows_no_more():
     assert np.flatnonzero(walks).tolist() == [1]
     found(steps, np.zeros(6), pictures=int(2.0 * FADE_S / PERIOD), start=AGAIN_S)
     assert steps.walks[1] < 0.2 * walks[1]
+
+
+def test_two_alarms_in_a_row_are_no_faster_a_walk_than_two_in_its_memory():
+    steps, miss = BiasSteps(INITIAL), 6.0 * np.eye(6)[1]
+    said = found(steps, miss, pictures=6)
+    moved = np.flatnonzero(said[:, 1])
+    assert len(moved) > 1
+    assert np.diff(moved).min() * PERIOD < MEMORY_S / 2.0
+    assert 0.0 < steps.walks[1] <= said[:, 1].max() ** 2 / MEMORY_S
+
+
+def test_a_walk_that_shows_no_more_is_forgotten_sooner_than_one_of_which_nothing_is_seen():
+    steps = BiasSteps(INITIAL)
+    found(steps, np.zeros(6), pictures=30)
+    steps.walks[1] = 1.0
+    for k in range(30):
+        steps.learn((30 + k) * PERIOD, np.zeros(6), S, P)
+    assert 0.5 < steps.walks[1] < 0.9  # pictures that fit too well say nothing
+    found(steps, 0.0 * np.ones(6), pictures=30, start=60 * PERIOD)
+    assert steps.walks[1] < 0.5
 
 
 @pytest.mark.slow
