@@ -19,12 +19,12 @@ def test_hands_move_as_recorded_ones_do_if_nobody_says_otherwise() -> None:
     assert set(hands) <= set(MEASURED)
 
 
-def test_the_figures_of_hands_that_are_none_name_them() -> None:
-    """Else a block would say something else when it is made anew."""
+def test_each_command_of_the_page_names_its_hands() -> None:
+    """Else a block would say something else when it is made anew, by other usual hands."""
     lines = (PAGES / "loop.md").read_text().splitlines()
     commands = [line for line in lines if line.startswith(".venv/bin/lightleash experiments loop")]
     assert commands
-    assert all("--hands steady moving" in command for command in commands)
+    assert all("--hands " in command for command in commands)
 
 
 @pytest.mark.parametrize(
