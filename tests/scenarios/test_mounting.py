@@ -34,6 +34,9 @@ def test_with_its_profile_it_flies_as_a_phone_whose_sensors_sit_square() -> None
 
 
 def test_without_it_knows_less_of_where_the_robot_is() -> None:
+    """0.88 mm for 0.79, all the while; 0.90 and 56 of 1298 ticks lost before 2a14cb0a."""
     known_mm, ticks, _ = flown(extrinsics=ASKEW)
-    unknown_mm, few, _ = flown(extrinsics=ASKEW, knows_extrinsics=False)
-    assert few < ticks or unknown_mm > 1.3 * known_mm
+    unknown_mm, few, left = flown(extrinsics=ASKEW, knows_extrinsics=False)
+    assert left == ""
+    assert few > 0.9 * ticks
+    assert unknown_mm > 1.05 * known_mm
