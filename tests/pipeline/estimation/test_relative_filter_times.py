@@ -137,3 +137,15 @@ def test_a_codec_s_dead_zone_before_a_phone_at_rest_is_no_time_offset(stick_px, 
         assert not estimator.complaint
         offsets.append(estimator.health.time_offset)
     assert np.nanmax(np.abs(offsets)) < 0.02  # 40 to 100 ms, when each picture was believed
+
+
+def test_what_biases_seemed_to_do_at_a_wrong_time_offset_is_forgotten(world, arriving, monkeypatch):
+    flight = Flight(world, arriving)
+    flight.to(2.0)
+    estimator = flight.filter
+    estimator._bias_steps.walks[1] = 1.0
+    flight.to(2.2)
+    assert estimator._bias_steps.walks[1] > 0.0
+    monkeypatch.setattr(estimator._offset, "must_begin_again", lambda *_: True)
+    flight.to(2.3)
+    assert not estimator._bias_steps.walks.any()
