@@ -61,6 +61,20 @@ def test_its_noise_is_what_its_rays_claim() -> None:
     assert np.std(whitened) == pytest.approx(1.0, abs=0.1)
 
 
+def test_leds_shine_where_they_are_and_the_pose_is_by_where_the_file_has_them() -> None:
+    one, exact = eye(0.0), eye(0.0)
+    one._phone.leds_in_b = LEDS + np.array([0.0, 0.01, 0.0])
+    seen, same = (eyes.seen(3.0, 3.0, at_rest) for eyes in (one, exact))
+    assert seen is not None
+    assert same is not None
+    assert seen.pose is not None
+    assert same.pose is not None
+    moved = seen.rays.tangents - same.rays.tangents
+    assert (np.linalg.norm(moved, axis=1) > 0.003).all()  # 10 mm at 2.5 m
+    shift_in_b = same.pose.R_cb.T @ (seen.pose.p_bc_in_c - same.pose.p_bc_in_c)
+    np.testing.assert_allclose(shift_in_b, [0.0, 0.01, 0.0], atol=1e-5)
+
+
 def test_hidden_leds_have_no_rays_and_few_give_no_pose() -> None:
     seen = eye(0.1, hidden=(0, 3)).seen(2.0, 2.0, at_rest)
     assert seen is not None
