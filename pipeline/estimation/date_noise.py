@@ -74,7 +74,7 @@ class DateNoise:
         step = 0.5 * GAIN * own / (known + own) * (min(ratio, SURPRISE) - 1.0)
         self._log = min(max(self._log + step, log(LEAST_S)), log(MOST_S))
 
-    def doubted(
+    def inflated(
         self,
         seen: VisionMeasurement,
         leds_in_b: Array,

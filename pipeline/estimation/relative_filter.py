@@ -200,7 +200,7 @@ class RelativeFilter:
     def _by_its_date(
         self, seen: VisionMeasurement, at: Checkpoint[VisionMeasurement], passing: Array
     ) -> VisionMeasurement:
-        return self._date_noise.doubted(seen, self._leds_in_b, at.x[0:3], at.R, passing)
+        return self._date_noise.inflated(seen, self._leds_in_b, at.x[0:3], at.R, passing)
 
     def _fuse(
         self, seen: VisionMeasurement, here: Checkpoint[VisionMeasurement], now: float

@@ -15,7 +15,7 @@ from hardware.sim.scenes.motion import Moving, PhoneAndRobotMotion, twin_of, wit
 from hardware.sim.scenes.scene import SCENES, Scene, at_reference
 from hardware.sim.scenes.sensor import BANK
 from hardware.sim.scenes.setting import optics_of, sensor_of, stage_of
-from hardware.sim.scenes.stage import Motion, Stage
+from hardware.sim.scenes.stage import SceneMotion, Stage
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import Image
@@ -98,7 +98,7 @@ class FlownScene:
         """Luma (height, width) whose middle row is exposed around `t` [s]; `rng` is its noise's."""
         if self._scene.twin and self._twin is None:
             self._twin = Beside(twin_of(self._scene, self._rng), robot(t)[1])
-        moving: Motion = PhoneAndRobotMotion(self._phone.hand, Followed(robot), self._twin)
+        moving: SceneMotion = PhoneAndRobotMotion(self._phone.hand, Followed(robot), self._twin)
         if self._stage is None:
             self._stage = self._set(moving, t)
         lit = self._stage.shown.copy()
@@ -107,7 +107,7 @@ class FlownScene:
         du, dv = (int(x) for x in rng.integers(0, BANK, 2))
         return stage.luma(self._sensor, camera, moving, t, (du, dv))
 
-    def _set(self, moving: Motion, t: float) -> Stage:
+    def _set(self, moving: SceneMotion, t: float) -> Stage:
         return stage_of(
             self._scene,
             moving,

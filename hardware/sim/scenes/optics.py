@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr
-from scipy.stats import ncx2
 
 from hardware.sim.scenes.kernels import STEP_PX
 from pipeline.frames import Array
@@ -106,6 +105,8 @@ def _discs() -> tuple[Array, Array, Array]:
 
     A Gaussian at distance d has ncx2(2, d²).cdf(r²) of its weight inside a circle of radius r.
     """
+    from scipy.stats import ncx2  # takes a while to import, and few who fly want it
+
     rhos = np.concatenate((np.geomspace(0.05, 30.0, 90), [1e4]))
     xs = np.linspace(-EDGE, EDGE + 0.2, 260)
     d = np.maximum(rhos[:-1, None] + xs, 0.0)

@@ -12,7 +12,7 @@ from hardware.sim.scenes.optics import Optics
 from hardware.sim.scenes.room import Room, bar_before, lights_around, mirror_near
 from hardware.sim.scenes.scene import HD, Scene, Size
 from hardware.sim.scenes.sensor import Sensor
-from hardware.sim.scenes.stage import Motion, Stage
+from hardware.sim.scenes.stage import SceneMotion, Stage
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 
@@ -43,7 +43,7 @@ def sensor_of(optics: Optics, camera: Camera) -> Sensor:
 
 def stage_of(
     scene: Scene,
-    moving: Motion,
+    moving: SceneMotion,
     t: float,
     *,
     leds_in_b: Array,

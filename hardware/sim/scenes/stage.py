@@ -22,7 +22,7 @@ from pipeline.signals import Image
 
 Flags = npt.NDArray[np.bool_]
 EVERYWHERE = (-1e4, 1e4)  # beyond any picture [px]
-Motion = PhoneAndRobotMotion[Moving]
+SceneMotion = PhoneAndRobotMotion[Moving]
 WHOLE = 0.99
 """Share of an LED's light that its robot's body must let through for it to be visible."""
 
@@ -78,35 +78,37 @@ class Stage:
         self,
         sensor: Sensor,
         camera: Camera,
-        moving: Motion,
+        moving: SceneMotion,
         t: float,
         shift: tuple[int, int],
         bound: bool,
     ) -> DrawnFrame:
         """The picture whose middle row is exposed around `t` [s], and what is true of it."""
-        sight = self._sight(sensor, camera, moving, t)
-        luma = self._picture(sensor, sight, shift)
-        n, room, lamps, panes = len(self.leds_in_b), sight.room, sight.lamps, sight.panes
+        projected = self._projected(sensor, camera, moving, t)
+        luma = self._rendered(sensor, projected, shift)
+        n, lamps, panes = len(self.leds_in_b), projected.lamps, projected.panes
         visible, merged = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         information = np.zeros((n, 2, 2))
-        for lamp, led in zip(lamps, sight.owners, strict=True):
+        for lamp, led in zip(lamps, projected.owners, strict=True):
             if led < 0:
                 continue
-            shown = sensor.share_shown(lamp, sight.body) if sight.body is not None else 1.0
+            shown = sensor.share_shown(lamp, projected.body) if projected.body is not None else 1.0
             visible[led] = shown > WHOLE and _in_sight(lamp, panes, sensor)
             if visible[led]:
-                merged[led] = is_merged(sensor, room, lamps, panes, lamp)
+                merged[led] = is_merged(sensor, projected.room, lamps, panes, lamp)
                 if bound:
                     information[led] = place_information(sensor, lamp)
-        return DrawnFrame(luma, sight.ways.rows[:n, :2], visible, merged, information)
+        return DrawnFrame(luma, projected.ways.rows[:n, :2], visible, merged, information)
 
     def luma(
-        self, sensor: Sensor, camera: Camera, moving: Motion, t: float, shift: tuple[int, int]
+        self, sensor: Sensor, camera: Camera, moving: SceneMotion, t: float, shift: tuple[int, int]
     ) -> Image:
         """The picture alone."""
-        return self._picture(sensor, self._sight(sensor, camera, moving, t), shift)
+        return self._rendered(sensor, self._projected(sensor, camera, moving, t), shift)
 
-    def _sight(self, sensor: Sensor, camera: Camera, moving: Motion, t: float) -> ProjectedScene:
+    def _projected(
+        self, sensor: Sensor, camera: Camera, moving: SceneMotion, t: float
+    ) -> ProjectedScene:
         exposure_s = sensor.optics.exposure_s
         ways = ways_of(lambda s: self._points(moving, t + s)[1], camera, exposure_s)
         body = self._silhouette(sensor, camera, moving, t)
@@ -114,10 +116,12 @@ class Stage:
         room, grey = self._room(camera, moving, t)
         return ProjectedScene(ways, body, lamps, owners, self._panes(sensor, ways), room, grey)
 
-    def _picture(self, sensor: Sensor, sight: ProjectedScene, shift: tuple[int, int]) -> Image:
-        return sensor.picture(sight.room, sight.grey, sight.lamps, sight.panes, shift, sight.body)
+    def _rendered(self, sensor: Sensor, projected: ProjectedScene, shift: tuple[int, int]) -> Image:
+        return sensor.picture(
+            projected.room, projected.grey, projected.lamps, projected.panes, shift, projected.body
+        )
 
-    def _points(self, moving: Motion, t: float) -> tuple[Array, Array]:
+    def _points(self, moving: SceneMotion, t: float) -> tuple[Array, Array]:
         """Points in f (m, 3) and in c: LEDs, mirrored ones, a twin's, lamps, windows, the bar."""
         (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = moving.phone_pose(t), moving.robot.pose(t)
         leds = p_bf_in_f + self.leds_in_b @ R_fb.T
@@ -134,7 +138,7 @@ class Stage:
         return in_f, (in_f - p_cf_in_f) @ R_fc
 
     def _silhouette(
-        self, sensor: Sensor, camera: Camera, moving: Motion, t: float
+        self, sensor: Sensor, camera: Camera, moving: SceneMotion, t: float
     ) -> Silhouette | None:
         body = self.body
         if body is None:
@@ -202,7 +206,7 @@ class Stage:
         return panes
 
     def _room(
-        self, camera: Camera, moving: Motion, t: float
+        self, camera: Camera, moving: SceneMotion, t: float
     ) -> tuple[npt.NDArray[np.float32], Image]:
         """The background as a camera sees it that has turned since the start."""
         turned = rpy_from_R(self.R_fc_start.T @ moving.phone_pose(t)[0])

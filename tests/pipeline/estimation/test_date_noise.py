@@ -75,15 +75,15 @@ def test_a_picture_is_doubted_along_its_motion_alone():
     arriving = events(World(WorldOptions(seed=11, duration=0.5)))
     seen = next(one for _, one in arriving if isinstance(one, VisionMeasurement))
     dates, pose = learnt(0.004), seen.pose
-    less = dates.doubted(seen, LEDS_IN_B, pose.p_bc_in_c, pose.R_cb, FAST)
+    less = dates.inflated(seen, LEDS_IN_B, pose.p_bc_in_c, pose.R_cb, FAST)
     more = less.pose.covariance - pose.covariance
     np.testing.assert_allclose(more, dates.sigma_s**2 * np.outer(FAST, FAST), atol=1e-15)
     wider = np.linalg.eigvalsh(less.rays.covariances - seen.rays.covariances)
     assert (wider[:, 1] > 1e-7).all()
     assert np.abs(wider[:, 0]).max() < 1e-12
     alone = replace(seen, pose=None)
-    few = dates.doubted(alone, LEDS_IN_B, pose.p_bc_in_c, pose.R_cb, FAST)
+    few = dates.inflated(alone, LEDS_IN_B, pose.p_bc_in_c, pose.R_cb, FAST)
     np.testing.assert_array_equal(few.rays.covariances, less.rays.covariances)
     right = learnt(0.0)
     assert right.sigma_s == 0.0
-    assert right.doubted(seen, LEDS_IN_B, pose.p_bc_in_c, pose.R_cb, FAST) is seen
+    assert right.inflated(seen, LEDS_IN_B, pose.p_bc_in_c, pose.R_cb, FAST) is seen
