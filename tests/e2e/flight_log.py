@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -57,6 +58,8 @@ class FlightLog:
         self._page = connect(url, additional_headers=headers, compression=None, proxy=None)
         self._page.send(json.dumps({"type": "hello", "version": VERSION, "role": "supervisor"}))
         self.said: list[Said] = []
+        self.newest: dict[str, Any] = {}
+        """The last status, whole."""
         self._has_followed = False
         self.is_over = False
         """Whether the robot came down after it had followed."""
@@ -70,6 +73,7 @@ class FlightLog:
                     continue
                 told = json.loads(data)
                 if told["type"] == "status":
+                    self.newest = told
                     self._keep(Said(time.monotonic(), *(told[k] for k in KEPT)))
 
     def _keep(self, said: Said) -> None:
