@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from server.common import clock
 from server.common.options import Parser
 from server.common.ranges import number, whole
-from server.common.text import table
+from server.common.text import dashed
 from server.diagnostics.load import Look, idle_share, look
 from server.virtual_phone.phone_script import CODECS
 from tests.e2e.flight_log import FlightLog, Said
@@ -41,6 +41,9 @@ ROBOT: Final = "ames"
 BEGIN_S, SETTLE_S, LEAVE_S = 30.0, 3.0, 20.0
 """By then each is followed that ever will be; what begins a flight is over; a phone has gone."""
 MOST_ROBOTS: Final = 32
+NAN: Final = float("nan")
+NO_STREAM: Final = {"rate_hz": 0.0}
+"""Of a server whose phone has gone."""
 TICK_HZ: Final = os.sysconf("SC_CLK_TCK")
 COLUMNS: Final = (
     ("robots", "robots", "{}"),
@@ -179,11 +182,11 @@ def measured(robots: int, seconds: float, codec: str) -> Row:
         server=flight.taken_pct([one["server"] for one in roles]),
         phone=flight.taken_pct(flight.phones),
         idle=100.0 * idle_share(flight.before, flight.after),
-        pictures_hz=min(one["streams"]["pose"]["rate_hz"] for one in told),
+        pictures_hz=min(one["streams"].get("pose", NO_STREAM)["rate_hz"] for one in told),
         latency_ms=max(sum(one["latency_ms"].values()) for one in told),
-        late_ms=max(one["control"]["p99_ms"] for one in told),
-        missed=max(one["control"]["missed"] for one in told),
-        stall_ms=max(one["server"]["armed_stall_ms"] for one in told),
+        late_ms=max(one["control"].get("p99_ms", NAN) for one in told),
+        missed=max(one["control"].get("missed", NAN) for one in told),
+        stall_ms=max(one["server"].get("armed_stall_ms", NAN) for one in told),
         first=flight.first(),
     )
 
@@ -208,7 +211,7 @@ def main() -> int:
         rows.append(measured(robots, given.seconds, given.codec))
         print(rows[-1], file=sys.stderr, flush=True)
     print(f"{os.cpu_count()} processors, pictures by {given.codec}")
-    print(table(COLUMNS, rows))
+    print(dashed(COLUMNS, rows))
     for row in rows:
         print(f"{row.robots} robots: {row.first or 'all followed'}")
     return 0
