@@ -1,4 +1,5 @@
 import csv
+import gc
 import json
 from contextlib import closing
 from dataclasses import replace
@@ -233,6 +234,33 @@ def test_a_film_is_watched_through_all_channels():
     assert all(r.found == r.solvable == 6 for r in rows[:2])
     assert all(r.wrong == 0 and r.effective_px < 0.3 for r in rows[:2])
     assert "clean" in text(rows)
+
+
+def test_no_look_waits_for_a_full_collection_of_garbage(monkeypatch):
+    look, looking, full = ChannelRun._look, [], []
+
+    def looked(*arguments):
+        looking.append(True)
+        try:
+            return look(*arguments)
+        finally:
+            looking.clear()
+
+    def collected(phase, info):
+        if phase == "start" and info["generation"] == 2:
+            full.append(bool(looking))
+
+    monkeypatch.setattr(ChannelRun, "_look", looked)
+    usual = gc.get_threshold()
+    gc.callbacks.append(collected)
+    gc.set_threshold(20, 1, 1)  # Python's own way would be to collect all in each look
+    try:
+        watch(SCENES["clean"], HD, 3, 3, [channel("raw")], plain=False)
+    finally:
+        gc.callbacks.remove(collected)
+        gc.set_threshold(*usual)
+    assert full  # the one before the film
+    assert not any(full)
 
 
 def test_without_motion_sensors_a_turned_picture_is_not_judged():
