@@ -24,6 +24,7 @@ from pipeline.gains import Gains
 
 BODY_AGES_S: Final = tuple(0.0025 * k for k in range(1, 33))
 """Up to 80 ms; in between, what holds for the next older one counts."""
+_AGES_S: Final = np.array(BODY_AGES_S)
 RESOLUTION_S: Final = 0.002
 NEVER: Final = -1.0  # no age [s]
 OTHER_BODY: Final = (
@@ -43,7 +44,7 @@ class Bearable:
 
     def latency(self, body_age: float) -> float:
         """Largest age of images [s] with body samples so old [s]."""
-        i = int(np.searchsorted(BODY_AGES_S, body_age - 1e-6))
+        i = int(np.searchsorted(_AGES_S, body_age - 1e-6))  # NaN is older than all
         return self.latencies[i] if i < len(self.latencies) else NEVER
 
 

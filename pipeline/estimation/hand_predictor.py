@@ -11,6 +11,7 @@ learnt one, holding the last rate, and expecting none. So none is used that was 
 from __future__ import annotations
 
 from collections import deque
+from functools import cache
 from math import exp
 from typing import Final, get_args
 
@@ -50,11 +51,9 @@ class HandPredictor:
     def __init__(self, config: HandConfig) -> None:
         """Expect the average hand of `config`."""
         self._config = config
-        past, self._prior = _average(config)
-        self._weights = np.zeros((len(KINDS), TAPS, AHEAD))
-        self._weights[LEARNT] = self._prior
-        self._weights[KINDS.index("hold"), 0] = 1.0
-        self.turns = np.array([_turns(past, weights) for weights in self._weights])
+        self._prior, weights, turns = _average(config)
+        self._weights = weights.copy()
+        self.turns = turns.copy()
         """(kinds, AHEAD, 3) mean square of what forecasts of each kind got wrong [rad²]."""
         self._keep = exp(-STEP_S / config.memory_s)
         self._A, self._B = np.zeros((TAPS, TAPS)), np.zeros((TAPS, AHEAD))
@@ -100,7 +99,17 @@ class HandPredictor:
         self._then.append(newest.copy())
 
 
-def _average(c: HandConfig) -> tuple[Array, Array]:
+@cache
+def _average(config: HandConfig) -> tuple[Array, Array, Array]:
+    """The average hand's weights (TAPS, AHEAD); those of each kind; what these get wrong of it."""
+    past, prior = _rates(config)
+    weights = np.zeros((len(KINDS), TAPS, AHEAD))
+    weights[LEARNT] = prior
+    weights[KINDS.index("hold"), 0] = 1.0
+    return prior, weights, np.array([_turns(past, of_kind) for of_kind in weights])
+
+
+def _rates(c: HandConfig) -> tuple[Array, Array]:
     """Covariance (TAPS + AHEAD, same) of the average hand's rates, past first; its weights.
 
     k(τ) = slow² exp(−τ²/2 length²) + tremor² exp(−τ/coherence) cos(2π frequency τ): Gaussian

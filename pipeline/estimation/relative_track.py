@@ -76,6 +76,8 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._configured = self._noise[:, :3].copy()
         self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0, :2]]
         self._tones = [Tones(limits) for limits in (ROBOT, PHONE)]
+        self._has_news = [False, False]
+        """Samples of the robot, of the phone, from which nothing was learnt yet."""
         self._initial, self._initial_offset = initial_biases(config), config.initial_offset
         self._gate, self._still = config.gate_chi2, config.offset_still
         self.tone: Tone | None = None
@@ -101,8 +103,6 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """Remember a sample of `body` or `phone`, of whose hand it tells; False: it was there."""
         if not super().insert(stream, t, rate, force, more):
             return False
-        if stream is self.phone:
-            self._hand.follow(stream)
         device = int(stream is self.phone)
         for sensor, (scale, sample) in enumerate(
             zip(self._scales[device], (rate, force), strict=True)
@@ -112,8 +112,17 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
             self._noise[device, 3, sensor] = scale.limit
         self._heard[device].add(t, rate, force)
         self._tones[device].add(t, rate, force)
-        self._set_sample_noise(device)
+        self._has_news[device] = True
         return True
+
+    def _learn(self) -> None:
+        """What samples tell of noise and of the hand: once for all that came since it was used."""
+        for device, has_news in enumerate(self._has_news):
+            if has_news:
+                self._set_sample_noise(device)
+        if self._has_news[1]:
+            self._hand.follow(self.phone)
+        self._has_news = [False, False]
 
     @property
     def body_noise(self) -> Array:
@@ -318,6 +327,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         return bool(is_sound(here.x, here.R, here.P))
 
     def _advance(self, here: Checkpoint[VisionMeasurement], t: float) -> None:
+        self._learn()
         body, phone = self.body, self.phone
         transit(
             here.x,

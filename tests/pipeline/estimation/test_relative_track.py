@@ -206,3 +206,17 @@ def test_rays_of_any_memory_layout_are_the_same_to_the_compiler(samples):
         take(other, s)
     assert_same(*(t for t in (plain, other) if t.to_now(1.0)))
     assert len(fuse_rays.signatures) == compiled
+
+
+def test_what_samples_tell_is_the_same_whether_anybody_asked_meanwhile_or_not(samples):
+    asked, left_alone = begun(samples), begun(samples)
+    for s in samples:
+        if isinstance(s, VisionMeasurement):
+            continue
+        insert(asked, s)
+        insert(left_alone, s)
+        asked.predicted(max(s.t, asked.base.t))
+    a, b = (track.predicted(END_S + 0.03) for track in (asked, left_alone))
+    assert np.array_equal(a.x, b.x)
+    assert np.array_equal(a.R, b.R)
+    assert np.array_equal(a.P, b.P)
