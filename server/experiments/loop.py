@@ -22,7 +22,7 @@ from server.common import clock, text
 from server.common.ranges import number, seed_number
 from server.control.process import teleop_config
 from server.experiments.drawing import panels, save
-from server.experiments.runner import ExperimentReport, experiment
+from server.experiments.runner import ExperimentReport, RefusedError, experiment
 from server.simulation.figures import TrackingFigures, result_of, rows_of
 from server.simulation.trace import TrackingTrace
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
@@ -31,6 +31,8 @@ Hidden = tuple[float, float, tuple[int, ...]]
 
 RECORDED = ("filming", "before_target")
 """Hands as people's move; what `steady` and `moving` are shaken by is no hand's tremor."""
+VIRTUAL = ("date-jitter-ms", "led-error-mm", "hide", "out")
+"""Options of virtual time alone."""
 HEADINGS = (
     ("around", "around", "{:<15}"),
     ("hand", "hand", "{:<9}"),
@@ -144,15 +146,27 @@ def hidden(options: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:
 
 
 def live(arguments: argparse.Namespace) -> int:
-    """Fly in real time, through a server of its own on this machine."""
+    """Fly in real time, through a server of its own on this machine.
+
+    Raises:
+        RefusedError: what is asked for can't be had live.
+    """
+    asked = [f"--{name}" for name in VIRTUAL if getattr(arguments, name.replace("-", "_"))]
+    if asked:
+        raise RefusedError(f"{', '.join(asked)}: not with --live")
     from server.virtual_phone import live_loop
 
+    low, high = arguments.latency_ms
+    phone = ["--fps", f"{arguments.fps:g}", "--latency-ms", f"{low:g}-{high:g}"]
+    phone += ["--codec", arguments.codec]
     robot, gains, estimator = arguments.robot, arguments.gains, arguments.estimator
     with live_loop.server(robot, gains, estimator) as environment:
-        for hand in arguments.hands:
-            summary = live_loop.fly(environment, hand, arguments.seconds, arguments.seed)
+        for hand, around in product(arguments.hands, arguments.around or [None]):
+            options = [*phone, "--around", around] if around else phone
+            summary = live_loop.fly(environment, hand, arguments.seconds, arguments.seed, options)
             figures = "  ".join(f"{name} {value}" for name, value in summary.items())
-            print(f"live  {hand:<9}  {figures}", flush=True)
+            where = f"{around:<15}  " if around else ""
+            print(f"live  {where}{hand:<9}  {figures}", flush=True)
     return 0
 
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -57,8 +57,10 @@ def server(robot: str, gains: str, estimator: str = "relative") -> Iterator[dict
             process.wait(20.0)
 
 
-def fly(environment: dict[str, str], hand: str, seconds: float, seed: int) -> Summary:
-    """One flight of a virtual phone, and what it says of it.
+def fly(
+    environment: dict[str, str], hand: str, seconds: float, seed: int, options: Sequence[str] = ()
+) -> Summary:
+    """One flight of a virtual phone with further `options`, and what it says of it.
 
     Raises:
         RuntimeError: the phone failed; says how.
@@ -73,7 +75,7 @@ def fly(environment: dict[str, str], hand: str, seconds: float, seed: int) -> Su
         str(seed),
     ]
     done = subprocess.run(
-        [*command, "--seconds", str(seconds + EXTRA_S)],
+        [*command, "--seconds", str(seconds + EXTRA_S), *options],
         env=environment,
         capture_output=True,
         text=True,

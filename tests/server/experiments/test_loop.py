@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
+from typing import Any
 
 import pytest
 
 from hardware.sim.measured_hands import MEASURED
 from server.experiments import loop, main
+from server.virtual_phone import live_loop
+from server.virtual_phone.command import make_parser
 from tests.bench.blocks import PAGES
 
 
@@ -45,3 +49,32 @@ def test_a_hand_that_there_is_not_is_refused_in_a_line(
     assert said.err.startswith(f"lightleash experiments {words[0]}: hand: 'shaky' is neither")
     assert said.err.count("\n") == 1
     assert said.out == ""
+
+
+def test_what_can_t_be_had_live_is_refused_before_a_server_starts(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(live_loop, "server")
+    words = ["--live", "--date-jitter-ms", "4", "--led-error-mm", "1", "--hide", "2", "3"]
+    assert main(["loop", "--hands", "still", *words]) == 2
+    said = "--date-jitter-ms, --led-error-mm, --hide: not with --live\n"
+    assert capsys.readouterr().err == f"lightleash experiments loop: {said}"
+
+
+def test_a_live_phone_is_as_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown: list[tuple[object, str, float, int, list[str]]] = []
+    monkeypatch.setattr(live_loop, "server", lambda *robot: nullcontext({"of": robot}))
+
+    def fly(*flight: Any) -> dict[str, float]:
+        flown.append(flight)
+        return {"rms_mm": 3.0}
+
+    monkeypatch.setattr(live_loop, "fly", fly)
+    words = ["--live", "--fps", "15", "--latency-ms", "40", "80", "--codec", "jpeg"]
+    words += ["--seconds", "7", "--seed", "3", "--around", "typical", "far"]
+    assert main(["loop", "--robot", "copter", "--hands", "still", *words]) == 0
+    phone = ["--fps", "15", "--latency-ms", "40-80", "--codec", "jpeg", "--around"]
+    server = {"of": ("copter", "phone", "relative")}
+    assert flown == [(server, "still", 7.0, 3, [*phone, scene]) for scene in ("typical", "far")]
+    command = make_parser().parse_args(flown[0][-1])
+    assert (command.fps, command.latency_ms, command.around) == (15.0, (0.04, 0.08), "typical")
