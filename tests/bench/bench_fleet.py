@@ -130,9 +130,9 @@ class Flight:
         if not ends:
             return ""
         t, k, one = min(ends, key=lambda end: end[:2])
-        return (
-            f"{t - self.since:.1f} s: robot {k + 1} of {len(self.said)}, {one.mode}: {one.reason}"
-        )
+        refused = self.told[k]["refusals"][:1] if one.mode == "DISARMED" else []
+        why = " ".join((one.reason, *refused))
+        return f"{t - self.since:.1f} s: robot {k + 1} of {len(self.said)}, {one.mode}: {why}"
 
 
 def fly(servers: Sequence[Serving], names: Sequence[str], seconds: float, codec: str) -> Flight:
@@ -213,7 +213,7 @@ def main() -> int:
     print(f"{os.cpu_count()} processors, pictures by {given.codec}")
     print(dashed(COLUMNS, rows))
     for row in rows:
-        print(f"{row.robots} robots: {row.first or 'all followed'}")
+        print(f"of {row.robots}: {row.first or 'all followed'}")
     return 0
 
 
