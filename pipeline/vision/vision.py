@@ -32,6 +32,7 @@ from pipeline.vision.blink_code import BlinkCode
 from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.last_pose import LastPose, Place
 from pipeline.vision.led_tracker import LedTracker
+from pipeline.vision.misplaced_leds import MisplacedLeds
 from pipeline.vision.motion_hypotheses import CandidateView
 from pipeline.vision.rays import NO_RAYS, rays_of
 from pipeline.vision.robot_identity import RobotIdentity
@@ -44,6 +45,8 @@ STAGES = ("detect", "identify", "pose")
 UNTIMED = np.zeros(3)
 IN_VAIN = 3
 """Searches, after which as many count bright lights for lamps; then for LEDs again."""
+LONG_IN_VAIN = 15
+"""Searches, after which the robot file may be what is wrong."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,6 +88,7 @@ class Vision:
         self._tracker = LedTracker(camera, leds_in_b, self._leds, self._identify)
         self._initialisation = Initialisation(camera, leds_in_b, self._identify)
         self._identity = RobotIdentity(leds_in_b, imus, blinks)
+        self._misplaced = MisplacedLeds(camera, leds_in_b, self._identify)
         self._in_vain = 0
         """Searches since a pose was believed."""
         self._area_px_m2 = 0.0
@@ -133,6 +137,7 @@ class Vision:
     def keep(self, pose: RelativePose) -> None:
         """`pose`, of the last picture, was believed: predict from it."""
         self._in_vain = 0
+        self._misplaced.forget()
         self._last.keep(pose, self._prior.expected)
         self._tilt_bias.learn(self._prior.up_in_c, self._prior.up_in_b, pose.R_cb)
 
@@ -206,6 +211,8 @@ class Vision:
         association = self._ours(t, alike, spots)
         if association is not None:
             return _Found(spots, self._exactly(association, spots), bounded=bounded)
+        if self._in_vain >= LONG_IN_VAIN:
+            self._misplaced.look(t, upright, self._verticals())
         return _Found(spots, few=self._few(upright), bounded=bounded)
 
     def _found_again(self) -> None:
@@ -234,11 +241,13 @@ class Vision:
 
     def _hints(self) -> SearchHints:
         """Hints for a search from nothing: the verticals, and what is remembered."""
-        up_in_c, up_in_b = self._prior.up_in_c, self._tilt_bias.corrected(self._prior.up_in_b)
-        memory = self._last.attitude()
+        memory, hints = self._last.attitude(), self._verticals()
         if memory is None:
-            return SearchHints(up_in_c, up_in_b)
-        return SearchHints(up_in_c, up_in_b, *memory, self._area_px_m2)
+            return hints
+        return SearchHints(hints.up_in_c, hints.up_in_b, *memory, self._area_px_m2)
+
+    def _verticals(self) -> SearchHints:
+        return SearchHints(self._prior.up_in_c, self._tilt_bias.corrected(self._prior.up_in_b))
 
     def _few(self, spots: Spots) -> Match | None:
         """Associate a few LEDs where a filter predicts them."""
@@ -260,7 +269,7 @@ class Vision:
             return self._identity.reason
         if self._initialisation.ambiguous:
             return f"{n} lights seen, and more than one way to see the robot in them."
-        return f"{n} lights seen, but they do not look like the robot."
+        return self._misplaced.reason or f"{n} lights seen, but they do not look like the robot."
 
 
 def warm_up() -> None:

@@ -58,14 +58,14 @@ def moved(truth, rng, dp=0.004, turn=0.006):
     return Truth(truth.p + rng.normal(0.0, dp, 3), R, R_fc)
 
 
-def picture(truth, rng, look=None, covered=(), camera=CAMERA):
-    """Luma of the scene; `covered` LEDs are dark."""
-    shown = np.delete(LEDS_IN_B, covered, axis=0)
+def picture(truth, rng, look=None, covered=(), camera=CAMERA, leds=LEDS_IN_B):
+    """Luma of the scene; `covered` of the `leds` (n, 3) are dark."""
+    shown = np.delete(leds, covered, axis=0)
     return render(camera, lambda _: (truth.R, truth.p), shown, look or RenderOptions(), rng)
 
 
-def frame_at(t, truth, rng, look=None, covered=()):
-    return Frame(t, picture(truth, rng, look, covered))
+def frame_at(t, truth, rng, look=None, covered=(), leds=LEDS_IN_B):
+    return Frame(t, picture(truth, rng, look, covered, leds=leds))
 
 
 def error_of(pose, truth):

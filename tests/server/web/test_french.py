@@ -22,7 +22,8 @@ SPEAKERS = {
     "pipeline/estimation": "rate_axes sensor_doubts sensor_monitor sensor_validation",
     "pipeline/glass": "lens_meter robot_of_light",
     "pipeline/timing": "clock_synchronisation offset_watch time_offset",
-    "pipeline/vision": "camera_lies gating repeated_frames robot_identity vision visual_front_end",
+    "pipeline/vision": "camera_lies gating misplaced_leds repeated_frames robot_identity vision"
+    " visual_front_end",
     "server/calibration": "guide job verdict",
     "server/control": "controller gap_log process robot_clock robot_health tick_rate told_body",
     "server/diagnostics": "blame camera_health link_words load",
