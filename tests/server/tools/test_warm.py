@@ -55,24 +55,48 @@ def test_a_second_time_nothing_is_compiled(monkeypatch, capsys):
     assert "about a minute" in capsys.readouterr().err
 
 
-CONTROL = """
-import sys
+LISTENING = """
 from pipeline.jit import numba
 compiled = []
 numba.core.event.register("numba:compile", type("", (numba.core.event.Listener,), {
-    "on_start": lambda self, event: compiled.append(str(event.data["dispatcher"])),
+    "on_start": lambda self, event: compiled.append((event.data["dispatcher"], event.data["args"])),
     "on_end": lambda self, event: None,
 })())
 from server.tools import warm
+"""
+ALL = """
+warm.compile_kernels()
+names = [(one.py_func.__module__, one.py_func.__qualname__, args) for one, args in compiled]
+ours = [name for name in names if not name[0].startswith("numba.")]
+print(len(ours), len(set(ours)), len({name[:2] for name in ours}))
+"""
+IN_FLIGHT = """
 warm._in_flight()
 print(len(compiled), *compiled)
 """
 
 
+def printed(program: str, **settings: str) -> str:
+    """What a process prints that listens to the compiler."""
+    command = [sys.executable, "-c", LISTENING + program]
+    environment = {**os.environ, **settings}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
 @pytest.mark.slow
 def test_a_warm_process_compiles_nothing(tmp_path):
     assert warmed()[0] == 0
-    said = subprocess.run(
-        [sys.executable, "-c", CONTROL], capture_output=True, text=True, check=True
-    ).stdout
+    said = printed(IN_FLIGHT)
     assert said.split()[0] == "0", said
+
+
+@pytest.mark.long
+@pytest.mark.slow
+def test_a_clean_start_compiles_each_kernel_once(tmp_path):
+    clean = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    compilations, signatures, kernels = map(int, printed(ALL, **clean).split())
+    print(f"{compilations} compilations of {kernels} kernels")
+    assert compilations == signatures
+    assert kernels > 150
+    assert printed(ALL, **clean).split()[0] == "0"
