@@ -28,7 +28,7 @@ from server.common import clock
 from server.common.access import PhoneClientError, access_of, add_access_arguments
 from server.common.child import raise_niceness, set_oom_score
 from server.common.options import Parser
-from server.common.ranges import MOST_PORT, number, whole
+from server.common.ranges import MOST_PORT, number, seed_number, whole
 from server.virtual_phone.live_phone import EXPOSED_S, LivePhone, MakeClient
 from server.virtual_phone.phone_client import PhoneClient
 from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
@@ -160,7 +160,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--camera-fault", choices=lies, default="none", help=f"after {CAMERA_FAULT_S:g} s"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of hand, noise and delays")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of hand, noise and delays")
     parser.add_argument("--robot", help="robot file with the LEDs; default: the server's")
     truth = whole(0, MOST_PORT)
     parser.add_argument("--truth-port", type=truth, help="UDP port of the simulated robot's truth")

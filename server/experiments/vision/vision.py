@@ -34,6 +34,7 @@ from hardware.sim.scenes.scene import (
 )
 from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
+from server.common.ranges import seed_number
 from server.experiments import processes
 from server.experiments.runner import make_folder
 from server.experiments.vision import lies
@@ -78,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CODEC",
         help="raw, jpeg, h264-MBIT, vp8-MBIT; with -noimu behind it: no motion sensors",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the first film")
+    parser.add_argument("--seed", type=seed_number, default=0, help="of the first film")
     parser.add_argument(
         "--tuning", action="store_true", help=f"use the seeds below {FIRST_REPORTING_SEED}"
     )

@@ -285,6 +285,7 @@ def test_a_busy_phone_leaves_a_picture_out_once_the_next_is_there_and_it_would_c
         ["--codec", "gif"],
         ["--fault", "haunted"],
         ["--truth-port", "70000"],
+        ["--seed", "-1"],
     ],
 )
 def test_command_refuses_what_it_cannot_play(arguments):
