@@ -1,7 +1,8 @@
 """What is nearly the robot: its file has LEDs elsewhere, or left and right exchanged.
 
 Whoever measured LEDs by a ruler, or with another idea of the axes, is told so in place of "they do
-not look like the robot". It is a hint for people; no pose comes of it.
+not look like the robot". It is a hint for people; no pose comes of it. All LEDs must be seen, of a
+robot with up to eight: of more, any half is searched for.
 """
 
 from __future__ import annotations
@@ -72,8 +73,9 @@ class MisplacedLeds:
             shown + 1 if one is not None else 0
             for shown, one in zip(self._shown, found, strict=True)
         ]
-        shown = (one if n >= SHOWN else None for n, one in zip(self._shown, found, strict=True))
-        elsewhere, mirrored = shown
+        elsewhere, mirrored = (
+            one if shown >= SHOWN else None for shown, one in zip(self._shown, found, strict=True)
+        )
         self.reason = ""
         if mirrored is not None:  # fits as well as the robot should
             self.reason = MIRRORED.format(lights=mirrored.leds)
