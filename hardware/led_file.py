@@ -34,6 +34,12 @@ def load_leds(name_or_path: str | Path) -> tuple[str, Array]:
     return str(name), reader.leds(table)
 
 
+def on_a_line(places: Array) -> bool:
+    """Whether all places (n, 3) [m] are on one line."""
+    spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    return bool(spread[1] < WIDTH_M)
+
+
 class _LedFileReader:
     """Checks what it reads."""
 
@@ -49,7 +55,7 @@ class _LedFileReader:
             self._refuse("leds", f"{low} to {high} of them, not {len(rows)}")
         leds = np.array([self._place(k, row) for k, row in enumerate(rows)])
         self._check_apart(leds)
-        if float(np.linalg.svd(leds - leds.mean(axis=0), compute_uv=False)[1]) < WIDTH_M:
+        if on_a_line(leds):
             self._refuse("leds", "not all on one line: turns about it can't be seen")
         return leds
 

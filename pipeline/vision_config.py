@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
+
+MIN_LEDS: Final = 4
+"""For a pose from nothing else: three are seen from up to four places alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +27,7 @@ class IdentifyConfig:
 
     tolerance_px: float = 3.0
     """Largest reprojection error of one LED."""
-    min_leds: int = 4
+    min_leds: int = MIN_LEDS
     shift_px: float = 15.0
     """How far an LED may be from where it is predicted while tracking."""
     expected_sigmas: float = 3.7

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 from hardware.follower import BlinkOrder
 from hardware.link.datagram import LinkError, fixed_fields
 from hardware.link.link_key import MAC_BYTES, mac
+from pipeline.vision.blink_code import SLOTS
 
 MAGIC, VERSION = b"LLbl", 1
-SLOTS = 8  # of a round
 LAYOUT = struct.Struct(f"<4sBBHQQQI{SLOTS}B")
 BYTES = LAYOUT.size + MAC_BYTES
 SHORTEST_MS, LONGEST_MS = 20, 1_000

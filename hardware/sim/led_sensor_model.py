@@ -18,13 +18,12 @@ from pipeline.imu_stream import ImuStreams
 from pipeline.signals import BodyImu, Match, PhoneImu, Spots, VisionMeasurement
 from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision.rays import rays_of
+from pipeline.vision_config import MIN_LEDS
 
 LEAST_NOISE_PX = 0.01
 """Nobody claims to know a spot's place better."""
 LED_NOISE_PX = 0.02
 """As vision's of rendered pictures."""
-MIN_LEDS = 4
-"""For a pose from nothing else."""
 
 
 class LedSensorModel:

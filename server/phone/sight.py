@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.camera.lens import Camera
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array, R_from_wxyz
 from pipeline.signals import Mode
 from pipeline.vision.detection import Detection
@@ -24,7 +25,6 @@ SURE_M: Final = 0.3
 """Nor to where it only might be: standard deviation."""
 FIELD: Final = 1.4
 """Times half the field of view: beyond that no lens model was fitted, and it may fold back."""
-NEAREST_M: Final = 0.1
 FOLLOWS: Final = (Mode.TRACK, Mode.COAST)
 
 

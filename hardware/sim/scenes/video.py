@@ -19,11 +19,11 @@ from hardware.sim.scenes.stage import DrawnFrame
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rotation_about_x
 from pipeline.signals import BodyImu, Image, PhoneImu
+from pipeline.vision_config import MIN_LEDS
 
 RATE_HZ = 30.0
 IMU_AHEAD_S = 0.03
 """Readings come sooner than pictures: those of so long after a picture are there before it."""
-MIN_LEDS = 4  # for a pose without a prior
 DISTORTION = np.array([0.05, -0.12, 0.0005, -0.0004, 0.02])
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 """Turns what is right and down clockwise."""

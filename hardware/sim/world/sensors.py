@@ -29,6 +29,7 @@ from pipeline.signals import (
     VisionMeasurement,
 )
 from pipeline.timing.camera_imu_delay import CameraImuDelay
+from pipeline.vision_config import MIN_LEDS
 
 Sample = PhoneImu | BodyImu | VisionMeasurement
 Event = tuple[float, Sample]
@@ -39,8 +40,6 @@ Listener = Callable[[Sample, Fusion | None], None]
 FOCAL_PX: Final = 900.0
 NOISE_PX: Final = 0.4
 OUTLIER_PX: Final = 60.0
-MIN_LEDS: Final = 4
-"""For a pose from nothing else."""
 PHONE_BIAS: Final = (0.002, 0.05)
 """σ of gyroscope [rad/s] and accelerometer [m/s²]."""
 PHONE_NOISE: Final = (0.001, 0.02)  # σ, in the same units

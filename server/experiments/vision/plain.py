@@ -10,12 +10,12 @@ from hardware.sim.scenes.video import RenderedFrame
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, exp
 from pipeline.signals import Image, RelativePose
+from pipeline.vision_config import MIN_LEDS
 from server.common.clock import thread_cpu
 
 THRESHOLD = 128  # grey, half of what there is
 AREA_PX = (2, 2000)
 REACH_PX = 20.0
-MIN_LEDS = 4  # for a pose without a prior
 
 
 class PlainTracker:

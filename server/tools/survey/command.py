@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hardware.camera_file import CameraFileError, load_camera
-from hardware.led_file import load_leds
+from hardware.led_file import load_leds, on_a_line
 from hardware.robot_file import RobotFileError
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
@@ -23,7 +23,7 @@ from server.media.tables import load_imu
 from server.tools.survey import options
 from server.tools.survey.picture import draw
 from server.tools.survey.reconstruction.bundle import DistanceConstraint
-from server.tools.survey.reconstruction.datum import fitted, levelled, matched, on_a_line
+from server.tools.survey.reconstruction.datum import fitted, levelled, matched
 from server.tools.survey.reconstruction.detections import FrameSpots
 from server.tools.survey.reconstruction.errors import SurveyError
 from server.tools.survey.reconstruction.gyro import GyroAttitude

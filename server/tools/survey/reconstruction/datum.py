@@ -14,14 +14,6 @@ DISTINCT = 1.5
 
 UNLIKE = 0.3
 """RMS difference from a design, of its size, beyond which the film shows something else."""
-WIDTH_M = 0.005
-"""Points that are nearer to one line are on it."""
-
-
-def on_a_line(places: Array) -> bool:
-    """Whether all places (n, 3) [m] are on one line."""
-    spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
-    return bool(spread[1] < WIDTH_M)
 
 
 def fitted(points: Array, onto: Array, scale: bool = False) -> tuple[Array, Array, Array, float]:
