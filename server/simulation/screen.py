@@ -92,9 +92,9 @@ class ScreenSimulation(VirtualTimeSimulation):
 
     def _lights(self, t: float) -> Lights:
         def ahead(seconds: float) -> list[tuple[float, Array, Array]]:
-            plant = self.follower.plant
-            now = [(self.t, plant.wxyz_fb, plant.p_bf_in_f)]
-            return now + [(self.t + dt, wxyz, p) for dt, wxyz, p in plant.ahead(seconds)]
+            body = self.follower.body
+            now = [(self.t, body.wxyz_fb, body.p_bf_in_f)]
+            return now + [(self.t + dt, wxyz, p) for dt, wxyz, p in body.ahead(seconds)]
 
         lights = self.robot_of_light.step(max(t, self.t), ahead)
         self.phases.add(lights.phase)
