@@ -26,6 +26,8 @@ MOST_LAG_S = 0.070
 """Beyond it the loop has no margin left: what is drawn ahead is guessed."""
 LEAST_LAG_S = -0.030
 """A lag below it can be none, unless the pictures' dates are wrong by more than they may."""
+OUTLYING = 5.0
+"""Times the median by which pictures are off that show another light."""
 MOST_MISFIT = 0.1
 """RMS of what the sweep does not explain, of its amplitude."""
 
@@ -71,12 +73,18 @@ class DisplayLagMeter:
         return found if found is not None and found.sigma < SURE_S else None
 
     def _fit(self) -> DisplayLag | None:
-        """Least squares of a sine's two parts and a place; None while they don't tell."""
+        """Least squares of a sine's two parts and a place; None while they don't tell.
+
+        A few pictures may show another light, as do those before the sweep is on the glass.
+        """
         if len(self._seen) < 8 or self._seen[-1][0] - self._seen[0][0] < LEAST_SWEEPS_S:
             return None
         t, right = np.array(self._seen).T
         phase = 2.0 * np.pi * SWEEP_HZ * t
         A = np.column_stack((np.sin(phase), np.cos(phase), np.ones(len(t))))
+        off = np.abs(right - A @ np.linalg.lstsq(A, right, rcond=None)[0])
+        shows = off <= OUTLYING * np.median(off)
+        A, right = A[shows], right[shows]
         (s, c, middle), *_ = np.linalg.lstsq(A, right, rcond=None)
         size = float(np.hypot(s, c))
         misfit = float(np.sqrt(np.mean((right - A @ (s, c, middle)) ** 2)))
@@ -84,5 +92,5 @@ class DisplayLagMeter:
         if not is_sweep:
             return None
         omega = 2.0 * np.pi * SWEEP_HZ
-        sigma = misfit / (size * omega) * float(np.sqrt(2.0 / len(t)))
+        sigma = misfit / (size * omega) * float(np.sqrt(2.0 / len(right)))
         return DisplayLag(float(np.arctan2(-c, s)) / omega, sigma)

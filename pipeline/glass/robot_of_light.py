@@ -146,10 +146,15 @@ class RobotOfLight:
             self._follow(self.lag, seen.t)
 
     def _measure(self, t: float, places: Array) -> None:
-        """Take where a light sweeps, clear of the fiducials: it outshines all on the glass."""
-        shown = places[self.glass.has(places)]
-        if len(shown) and abs(shown[0, 1]) < 0.5 * self.glass.tile_m:
-            self._meter.add_position(t, float(shown[0, 0]))
+        """Take where a light sweeps: the brightest of all on its line, clear of the fiducials.
+
+        These seem brighter than it from farther away, where it is smaller.
+        """
+        right, up = np.abs(places).T
+        sweeps = up < 0.5 * self.glass.tile_m
+        sweeps &= right < SWEEP_SHARE * self.glass.width_m + 0.5 * self.glass.tile_m
+        if sweeps.any():
+            self._meter.add_position(t, float(places[sweeps][0, 0]))
             self.lag, self._t_lag = self._meter.lag(), t
 
     def _follow(self, lag: DisplayLag, t: float) -> None:

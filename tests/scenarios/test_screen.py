@@ -1,8 +1,10 @@
 """A phone that films a screen leads a robot which is only light."""
 
+from dataclasses import replace
+
 import pytest
 
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import TeleopConfig
 from server.control.process import teleop_config
@@ -31,6 +33,30 @@ def test_a_phone_before_a_screen_measures_its_lag_and_leads_the_robot_of_light()
     assert figures.tracked_s > 2.0
     assert not figures.ended
     assert figures.rms_mm < 8.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("distance_m", [0.8, 1.2])
+def test_from_wherever_the_glass_is_seen_its_lag_is_measured_in_three_seconds(distance_m):
+    """From farther away the fiducials seem brighter than the light that sweeps."""
+    there = replace(SCREEN, start=replace(SCREEN.start, distance=distance_m))
+    scene = SimulationOptions(hand="still", seed=1000)
+    simulation = ScreenSimulation(there, CONFIG, scene, Display(lag_s=0.04))
+    simulation.run(3.6)
+    assert "robot" in simulation.phases
+    assert abs(simulation.robot_of_light.lag.value - 0.044) < 0.004
+
+
+@pytest.mark.slow
+def test_an_arm_is_led_as_a_robot_of_light():
+    scene = SimulationOptions(hand="filming", seed=1012)
+    arm = load_robot("so101", takes=COMMANDS)
+    simulation = ScreenSimulation(arm, TeleopConfig(), scene, Display())
+    figures = result_of(simulation.run(10.0), simulation.scene, 0.0)
+    assert figures.tracked_s > 3.0
+    assert not figures.ended
+    assert figures.rms_mm < 20.0
+    assert figures.rms_deg < 1.0
 
 
 @pytest.mark.slow
