@@ -19,6 +19,7 @@ SWEEP_SHARE = 0.2
 """Amplitude of the sweep, of the glass's width."""
 LEAST_SWEEPS_S = 2.0
 """Filmed for so long a sweep can't be mistaken."""
+LEAST_PICTURES = 8
 KEPT_S = 4.0
 SURE_S = 0.003
 """Standard deviation of a lag that may be used [s]."""
@@ -77,14 +78,16 @@ class DisplayLagMeter:
 
         A few pictures may show another light, as do those before the sweep is on the glass.
         """
-        if len(self._seen) < 8 or self._seen[-1][0] - self._seen[0][0] < LEAST_SWEEPS_S:
+        if len(self._seen) < LEAST_PICTURES:
             return None
         t, right = np.array(self._seen).T
         phase = 2.0 * np.pi * SWEEP_HZ * t
         A = np.column_stack((np.sin(phase), np.cos(phase), np.ones(len(t))))
         off = np.abs(right - A @ np.linalg.lstsq(A, right, rcond=None)[0])
         shows = off <= OUTLYING * np.median(off)
-        A, right = A[shows], right[shows]
+        t, A, right = t[shows], A[shows], right[shows]
+        if len(t) < LEAST_PICTURES or t[-1] - t[0] < LEAST_SWEEPS_S:
+            return None
         (s, c, middle), *_ = np.linalg.lstsq(A, right, rcond=None)
         size = float(np.hypot(s, c))
         misfit = float(np.sqrt(np.mean((right - A @ (s, c, middle)) ** 2)))
