@@ -95,5 +95,5 @@ class DisplayLagMeter:
         if not is_sweep:
             return None
         omega = 2.0 * np.pi * SWEEP_HZ
-        sigma = misfit / (size * omega) * float(np.sqrt(2.0 / len(right)))
+        sigma = misfit / (size * omega) * float(np.sqrt(2.0 / len(t)))
         return DisplayLag(float(np.arctan2(-c, s)) / omega, sigma)

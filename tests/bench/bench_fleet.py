@@ -64,7 +64,7 @@ and what is idle of all processors."""
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class FleetRow:
     """So many robots at a time."""
 
     robots: int
@@ -84,7 +84,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Flight:
+class FleetFlight:
     """What was seen of all robots together."""
 
     since: float
@@ -135,7 +135,9 @@ class Flight:
         return f"{t - self.since:.1f} s: robot {k + 1} of {len(self.said)}, {one.mode}: {why}"
 
 
-def fly(servers: Sequence[Serving], names: Sequence[str], seconds: float, codec: str) -> Flight:
+def fly(
+    servers: Sequence[Serving], names: Sequence[str], seconds: float, codec: str
+) -> FleetFlight:
     """All at once, each led by a phone in a process of its own."""
     logs = [FlightLog(server) for server in servers]
     command = [sys.executable, "-m", "server", "phone", "--hand", "moving", "--codec", codec]
@@ -160,10 +162,10 @@ def fly(servers: Sequence[Serving], names: Sequence[str], seconds: float, codec:
     for log in logs:
         log.close()
     pids = [phone.pid for phone in phones]
-    return Flight(since, until, before, after, [log.said for log in logs], told, pids)
+    return FleetFlight(since, until, before, after, [log.said for log in logs], told, pids)
 
 
-def measured(robots: int, seconds: float, codec: str) -> Row:
+def measured(robots: int, seconds: float, codec: str) -> FleetRow:
     """So many robots, each with its server, for a while."""
     names = [f"robot{k + 1}" for k in range(robots)]
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
@@ -174,7 +176,7 @@ def measured(robots: int, seconds: float, codec: str) -> Row:
         roles = [processes(server.process.pid) for server in servers]
         flight = fly(servers, names, seconds, codec)
     told = flight.told
-    return Row(
+    return FleetRow(
         robots=robots,
         following=min(flight.following_pct(said) for said in flight.said),
         robot=flight.taken_pct([one["robot"] for one in roles]),
