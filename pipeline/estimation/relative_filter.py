@@ -38,7 +38,14 @@ from pipeline.estimation.tones import PICTURES, Tones
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, log
 from pipeline.robot import ToldMotion
-from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
+from pipeline.signals import (
+    BodyImu,
+    PhoneImu,
+    RelativePose,
+    RelativeState,
+    StampOffset,
+    VisionMeasurement,
+)
 from pipeline.so3_kernels import largest_sigma
 from pipeline.timing.offset_watch import OffsetMonitor
 
@@ -320,6 +327,15 @@ class RelativeFilter:
             return None
         newest = self._track.newest
         return newest.t, newest.x[0:3].copy(), newest.R.copy(), newest.P[:6, :6].copy()
+
+    @property
+    def time_offset(self) -> StampOffset | None:
+        """Of the pictures' stamps, as learnt; None while it is not known, or not believed."""
+        if not self._started or self.complaint:
+            return None
+        newest = self._track.newest
+        sigma = float(np.sqrt(newest.P[OFFSET, OFFSET]))
+        return StampOffset(float(newest.x[X_OFFSET]), sigma, self._t_start)
 
     @property
     def complaint(self) -> str:

@@ -23,8 +23,11 @@ LEAST_PICTURES = 8
 KEPT_S = 4.0
 SURE_S = 0.003
 """Standard deviation of a lag that may be used [s]."""
-MOST_LAG_S = 0.070
-"""Beyond it the loop has no margin left: what is drawn ahead is guessed."""
+MOST_LAG_S = 0.080
+"""A display of 60 ms, whose light stays for a frame. Beyond it the loop has no margin left: what is
+drawn ahead is guessed."""
+BORNE_S = 0.010
+"""So much more is borne of a lag that is corrected while somebody leads."""
 LEAST_LAG_S = -0.030
 """A lag below it can be none, unless the pictures' dates are wrong by more than they may."""
 OUTLYING = 5.0
@@ -42,10 +45,9 @@ class DisplayLag:
     sigma: float
     """[s]."""
 
-    @property
-    def is_fit(self) -> bool:
-        """Whether a robot can be led on that display."""
-        return LEAST_LAG_S <= self.value <= MOST_LAG_S
+    def is_fit(self, *, is_shown: bool = False) -> bool:
+        """Whether a robot can be led on that display, or `is_shown` on it may stay there."""
+        return LEAST_LAG_S <= self.value <= MOST_LAG_S + (BORNE_S if is_shown else 0.0)
 
 
 def swept(t: Array) -> Array:

@@ -14,7 +14,7 @@ from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import GRAVITY, Array
 from pipeline.glass.window import Glass
-from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
+from pipeline.signals import BodyImu, PhoneImu, StampOffset, VisionMeasurement
 
 AT_REST = RelativeConfig(
     sigma_omega_b=1e-4,
@@ -35,6 +35,8 @@ AVERAGED_S = 0.1
 """Over which the phone's accelerometer is averaged."""
 OLD_S = 0.15
 """An eye that rests on no picture newer than this is nobody's."""
+DATED_S = 1e-3
+"""Standard deviation below which a time offset is told."""
 UNSURE_M = 5e-3
 """Standard deviation beyond which an eye is nobody's."""
 
@@ -98,6 +100,12 @@ class EyeTracker:
             specific_force_in_g = seen.pose.R_cb.T @ np.mean(near, axis=0)
             self._up_in_g += share * (specific_force_in_g - self._up_in_g)
         self._filter.add_seen(seen, now)
+
+    @property
+    def time_offset(self) -> StampOffset | None:
+        """Of the pictures' stamps, by a glass that stands still; None while it is not sure."""
+        offset = self._filter.time_offset
+        return offset if offset is not None and offset.sigma < DATED_S else None
 
     def at(self, now: float) -> Eye | None:
         """The eye at `now` [s], which does not go back; None while nothing is known."""

@@ -21,7 +21,7 @@ from pipeline.glass.lag_tracker import LagTracker
 from pipeline.glass.lens_meter import SPREAD_S, TILT, GlassCorners, GlassViews, LensMeter
 from pipeline.glass.turn_meter import HeldTurning, TurnMeter
 from pipeline.glass.window import Glass, Hanging, pierced, seen_through
-from pipeline.signals import PhoneImu, VisionMeasurement
+from pipeline.signals import PhoneImu, StampOffset, VisionMeasurement
 
 Phase = Literal["search", "sweep", "robot"]
 """Fiducials alone; and a light that sweeps, drawn by the page itself; and the robot's LEDs."""
@@ -89,6 +89,8 @@ class RobotOfLight:
         self.lag: DisplayLag | None = None
         """Of the display, once it is measured; followed from then on."""
         self._t_lag = -np.inf
+        self._is_shown = False
+        """To the camera in use, since its lag was fit."""
         self._views: GlassViews | None = None
         self._turns = TurnMeter()
         self.eye: Eye | None = None
@@ -99,7 +101,7 @@ class RobotOfLight:
         self._eye, self.eye = EyeTracker(self.glass), None
         # through another lens lights seem elsewhere, which a meter would take for a lag
         self._meter = DisplayLagMeter(SWEEP_SHARE * self.glass.width_m)
-        self._tracker = LagTracker()
+        self._tracker, self._is_shown = LagTracker(), False
         self._lens = LensMeter(camera, self.glass) if is_guessed else None
         self._turns = TurnMeter()
         self._views = GlassViews(camera, self.glass, SPREAD_S)
@@ -116,6 +118,11 @@ class RobotOfLight:
         if views is None:
             return None
         return GlassSeen(self.lag, self._t_lag, views, self._turns.held())
+
+    @property
+    def time_offset(self) -> StampOffset | None:
+        """Of the camera's stamps, by the glass: how late lights are is not in it."""
+        return self._eye.time_offset
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
@@ -178,7 +185,8 @@ class RobotOfLight:
             return Lights("search", LOOK)
         if self.lag is None:
             return Lights("sweep", self._misplaced(eye))
-        if not self.lag.is_fit:
+        if not self.lag.is_fit(is_shown=self._is_shown):
+            self._is_shown = False
             late_ms = 1e3 * self.lag.value
             return Lights("search", f"This screen shows everything {late_ms:.0f} ms late, which is "
                           "too late to lead by: choose its game mode, or another one.")  # fmt: skip
@@ -198,6 +206,7 @@ class RobotOfLight:
             leds_in_g = hanging.leds_in_g(R_from_wxyz(wxyz[i]), p[i], self._leds_in_b)
             places[k] = pierced(eye.at(t), leds_in_g)
         self._tracker.add_drawn(start, places[0])
+        self._is_shown = True
         return Lights("robot", self._misplaced(eye), start, places)
 
     def _misplaced(self, eye: Eye) -> str:

@@ -21,8 +21,16 @@ class CameraImuDelay:
         """Begin with nothing known."""
         self._search = TimeOffset(TimeOffsetConfig(), imus)
         self._pictures = 0
-        self.offset: StampOffset | None = None
+        self._found: StampOffset | None = None
         """As of the last search that found one."""
+        self.told: StampOffset | None = None
+        """By what stands still beside the robot, in the same pictures; any thread may say it."""
+
+    @property
+    def offset(self) -> StampOffset | None:
+        """As it is known best; None while it is not known."""
+        told = self.told
+        return told if told is not None else self._found
 
     def add_pose(self, pose: RelativePose) -> None:
         """Take a believed pose; now and then search."""
@@ -31,4 +39,4 @@ class CameraImuDelay:
         if self._pictures % EVERY == 0:
             found = self._search.estimate()
             if found is not None:
-                self.offset = StampOffset(found.value_s, found.sigma_s, found.since)
+                self._found = StampOffset(found.value_s, found.sigma_s, found.since)

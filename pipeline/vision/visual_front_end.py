@@ -96,6 +96,10 @@ class VisualFrontEnd:
         """Follow what a filter says; None: it says nothing."""
         self._predictions.add(expected)
 
+    def dated_by(self, offset: StampOffset | None) -> None:
+        """What stands still in these pictures says when they were taken; None: nothing does."""
+        self._stamps.told = offset
+
     def blinks(self, code: BlinkCode | None) -> None:
         """The robot blinks so from now on; None: its LEDs shine."""
         self._vision.blinks(code)

@@ -8,7 +8,7 @@ from typing import Protocol
 from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.glass.robot_of_light import GlassSeen
-from pipeline.signals import Image, PhoneImu
+from pipeline.signals import Image, PhoneImu, StampOffset
 from pipeline.vision.detection import Detection
 from server.protocol.screen_messages import ScreenLights, ScreenSize
 
@@ -34,6 +34,10 @@ class ScreenDoor(Protocol):
     @property
     def seen(self) -> GlassSeen | None:
         """What the phone's camera has shown of it; None: nothing yet, or there is none."""
+
+    @property
+    def time_offset(self) -> StampOffset | None:
+        """Of the stamps of who films it, by the glass; None while it is not sure."""
 
     def enter(self, show: Show) -> bool:
         """Take the place; False while another screen has it."""

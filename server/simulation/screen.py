@@ -142,6 +142,7 @@ class ScreenSimulation(VirtualTimeSimulation):
             return
         if look.seen is not None:
             self.robot_of_light.add_seen(look.seen, look.lights_in_c, self.t)
+        self._frame_pipeline.front_end.dated_by(self.robot_of_light.time_offset)
 
     def _film(self, camera: Camera, t: float, _: BodyHistory, rng: np.random.Generator) -> Image:
         """A picture of the glass taken at `t` [s]."""

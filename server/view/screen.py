@@ -24,7 +24,7 @@ from pipeline.glass.robot_of_light import (
     RobotOfLight,
     least_height,
 )
-from pipeline.signals import Image, PhoneImu
+from pipeline.signals import Image, PhoneImu, StampOffset
 from pipeline.vision.detection import Detection
 from server.common.clock import now
 from server.phone.screen_door import Show
@@ -112,6 +112,11 @@ class Screen:
         """What a camera that was guessed truly has, once it is measured."""
         return self._thread.lens_of(camera) if self._thread is not None else None
 
+    @property
+    def time_offset(self) -> StampOffset | None:
+        """Of the stamps of who films it, by the glass; None while it is not sure."""
+        return self._thread.time_offset if self._thread is not None else None
+
     def add_detection(
         self, camera: Camera, is_guessed: bool, luma: Image, detection: Detection
     ) -> None:
@@ -138,6 +143,8 @@ class LightsThread:
         self._watch: GlassWatch | None = None
         self._guess, self._t_guess = "", -np.inf
         self.why = ""
+        self.time_offset: StampOffset | None = None
+        """See `Screen`; as of the last step."""
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="screen", daemon=True)
 
@@ -199,7 +206,7 @@ class LightsThread:
         while self._news:
             self._take(self._news.popleft(), t)
         shown = self._robot.step(t, self._ahead)
-        self.why = shown.why
+        self.why, self.time_offset = shown.why, self._robot.time_offset
         if shown.phase == "search" and t - self._t_guess < WHY_S:
             self.why = self._guess
         return self._message(shown)

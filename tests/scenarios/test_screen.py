@@ -48,6 +48,17 @@ def test_from_wherever_the_glass_is_seen_its_lag_is_measured_in_three_seconds(di
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [1000, 1002])
+def test_a_lag_believed_20_ms_too_short_costs_no_more_than_its_first_seconds(seed):
+    """What lights that come late seem to say of the pictures' dates is not believed."""
+    simulation = flight(Display(lag_s=0.06, believed_lag_s=0.048), seed)
+    figures = result_of(simulation.run(9.0), simulation.scene, 0.0)
+    assert figures.tracked_s > 4.5
+    assert not figures.ended
+    assert figures.rms_mm < 6.0
+
+
+@pytest.mark.slow
 def test_an_arm_is_led_as_a_robot_of_light():
     scene = SimulationOptions(hand="filming", seed=1012)
     arm = load_robot("so101", takes=COMMANDS)

@@ -37,7 +37,7 @@ def test_lags_are_found_to_three_milliseconds(lag, seed):
     assert found is not None
     assert abs(found.value - lag) < 0.003
     assert abs(found.value - lag) < 4.0 * found.sigma
-    assert found.is_fit == (lag <= MOST_LAG_S)
+    assert found.is_fit() == (lag <= MOST_LAG_S)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.15])
@@ -74,4 +74,4 @@ def test_what_does_not_sweep_gives_no_lag(what):
 def test_a_light_seen_the_wrong_way_round_is_no_display_one_may_lead_on():
     found = filmed(0.5 + 0.04).lag()
     assert found is not None
-    assert not found.is_fit
+    assert not found.is_fit()

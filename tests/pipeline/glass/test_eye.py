@@ -79,10 +79,11 @@ def corners(hand, t):
     return CAMERA.pixels((GLASS.fiducials() @ R_fg.T - p_cf_in_f) @ R_fc)
 
 
-def followed(seed, seconds=6.0, readout_s=0.0):
+def followed(seed, seconds=6.0, readout_s=0.0, late_s=0.0):
     """Errors (n, 3) [m] of the eye 50 ms ahead of the newest news, and the tracker.
 
-    The camera reads its lines in `readout_s`, which nobody was told.
+    The camera reads its lines in `readout_s`, and its pictures are stamped so much too late, which
+    nobody was told.
     """
     start = StartParameters(0.6, 0.0, 0.0)
     hand, rng = make_hand("moving", seed=seed, start=start), np.random.default_rng(seed)
@@ -98,7 +99,7 @@ def followed(seed, seconds=6.0, readout_s=0.0):
                 speed = (corners(hand, t + 1e-3) - pixels) / 1e-3
                 pixels = pixels + (pixels[:, 1:] / CAMERA.height - 0.5) * readout_s * speed
             noisy = pixels + 0.15 * rng.standard_normal(pixels.shape)
-            seen = glass_seen(CAMERA, GLASS, np.arange(16), noisy, t)
+            seen = glass_seen(CAMERA, GLASS, np.arange(16), noisy, t + late_s)
             eye.add_seen(seen, t + 0.02)
         now = t + 0.02
         found = eye.at(now)
@@ -117,6 +118,20 @@ def test_the_eye_is_smooth_and_ahead_of_its_pictures(seed):
     assert np.abs(np.diff(errors, axis=0)).max() < 2e-3
     assert np.abs(eye.up_in_g - R_fg.T @ [0.0, 0.0, 1.0]).max() < 0.01
     assert eye.at(6.02).is_sure
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("late_s", [-0.012, 0.0, 0.012])
+def test_a_glass_that_stands_still_tells_when_its_pictures_were_taken(late_s):
+    _, eye = followed(1000, late_s=late_s)
+    offset = eye.time_offset
+    assert offset is not None
+    assert abs(offset.value + late_s) < 1e-3
+    assert abs(offset.value + late_s) < 4.0 * offset.sigma
+
+
+def test_nobody_knows_when_pictures_were_taken_before_the_first_of_them():
+    assert EyeTracker(GLASS).time_offset is None
 
 
 @pytest.mark.slow

@@ -14,7 +14,15 @@ from pipeline.camera import verdict as camera_verdict
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.estimation import sensor_validation
 from pipeline.frames import exp
-from pipeline.signals import LedRays, PhoneImu, RelativePose, Spots, TouchState, VisionMeasurement
+from pipeline.signals import (
+    LedRays,
+    PhoneImu,
+    RelativePose,
+    Spots,
+    StampOffset,
+    TouchState,
+    VisionMeasurement,
+)
 from pipeline.vision import camera_lies, repeated_frames
 from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
@@ -393,6 +401,7 @@ class OpenableScreen:
 
     def __init__(self) -> None:
         self.lens: SimpleLens | None = None
+        self.time_offset: StampOffset | None = None
 
     def add_imu(self, sample: object) -> None:
         """Nothing of it."""
@@ -428,6 +437,20 @@ def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() ->
     rig.say(replace(JPEG, screen_angle_deg=90), 5)  # the same lens
     assert rig.phone.vision is not eyes
     assert rig.phone.vision.front_end.camera.focal_px == 0.7 * JPEG.width
+    rig.phone.close()
+
+
+def test_eyes_are_told_when_pictures_were_taken_by_the_glass_that_they_film() -> None:
+    rig, screen = Rig(DEVICE), OpenableScreen()
+    rig.phone._screen = screen  # type: ignore[assignment]
+    rig.synchronise()
+    rig.say(JPEG)
+    assert rig.phone.vision is not None
+    eyes = rig.phone.vision.front_end
+    for screen.time_offset in (None, StampOffset(0.004, 0.001), None):
+        rig.t += 0.02
+        rig.say(FLAT)
+        assert eyes.offset_s == (screen.time_offset.value if screen.time_offset else 0.0)
     rig.phone.close()
 
 

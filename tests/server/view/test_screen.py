@@ -16,7 +16,7 @@ from hardware.sim.truth import ahead_of, encode_truth
 from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import GRAVITY, R_from_rpy
-from pipeline.glass.display_lag import SWEEP_SHARE, swept
+from pipeline.glass.display_lag import BORNE_S, MOST_LAG_S, SWEEP_SHARE, DisplayLag, swept
 from pipeline.glass.fiducials import glass_seen
 from pipeline.glass.lens_meter import TILT, GlassCorners
 from pipeline.glass.window import CELLS, MARKER_IDS, TILE_SHARE, Glass, on_glass
@@ -123,6 +123,41 @@ def test_a_screen_that_is_too_late_is_told_so_and_shows_no_robot(make):
     assert lights.phase == "search"
     assert "90 ms late" in lights.why
     assert lights.places_mm == []
+
+
+def test_a_lag_that_is_corrected_beyond_what_is_fit_is_borne_a_little_by_who_leads(make):
+    """Light that goes out because its lag is known better would be worse than one so late."""
+    thread = make()
+    robot = thread._robot
+    assert filmed(thread, 3.5, 0.075).phase == "robot"
+    for since, lag_s, phase in (
+        (3.5, MOST_LAG_S + 0.8 * BORNE_S, "robot"),
+        (3.6, MOST_LAG_S + 1.2 * BORNE_S, "search"),
+        (3.7, MOST_LAG_S + 0.8 * BORNE_S, "search"),
+        (3.8, MOST_LAG_S - 0.001, "robot"),
+    ):
+        robot.lag = DisplayLag(lag_s, 0.001)
+        assert filmed(thread, 0.1, 0.075, since=since).phase == phase
+    robot.lag = DisplayLag(MOST_LAG_S + 0.8 * BORNE_S, 0.001)
+    thread.add(NewCamera(CAMERA, is_guessed=False))
+    assert filmed(thread, 1.0, 0.075, since=3.9).phase == "search"
+
+
+def test_who_films_a_glass_that_stands_still_tells_when_pictures_are_taken(make):
+    thread = make()
+    filmed(thread, 3.0, 0.03)
+    assert thread.time_offset is None  # a phone that holds still tells nothing of time
+    for k in range(240):
+        t, yaw, rate = 3.0 + k / 60.0, *(0.1 * f(0.1 * k) for f in (np.sin, np.cos))
+        thread.add(PhoneImu(t, np.array([0.0, 0.0, 6.0 * rate]), np.array([0.0, 0.0, GRAVITY])))
+        if k % 2 == 0:
+            R_gc = R_from_rpy(np.array([0.0, 0.0, yaw]))
+            pixels = CAMERA.pixels((AWAY + GLASS.fiducials()) @ R_gc)
+            seen = glass_seen(CAMERA, GLASS, np.arange(16), pixels, t + 0.008)
+            thread.add(GlassLook(seen, np.zeros((0, 3)), NO_CORNERS))
+        thread.step(t + 0.01)
+    assert thread.time_offset is not None
+    assert thread.time_offset.value == pytest.approx(-0.008, abs=1e-3)
 
 
 def test_a_phone_that_looks_away_loses_the_light(make):
