@@ -13,6 +13,9 @@ from pipeline.prediction import Prediction
 from pipeline.signals import RelativePose
 
 FORGET_MISSES = 3
+FOLLOWED = 3
+"""Fewer poses, and the attitude is forgotten with the place: what was seen but once was no robot,
+and whoever has another attitude than is remembered would be searched for in vain."""
 MAX_STEP_S = 0.5
 """Longer between pictures: the last pose predicts nothing."""
 CONTRADICTION_SIGMAS, CONTRADICTION_M, CONTRADICTION_RAD = 5.0, 0.03, 0.05
@@ -74,6 +77,8 @@ class LastPose:
         """Carried to the newest picture."""
         self._t, self._t_seen = -np.inf, -np.inf
         """Of the newest picture; of the last believed pose."""
+        self._followed = 0
+        """Poses since nothing was remembered."""
         self._sure = False
         """Gyroscopes alone have carried the attitude since then."""
         self._since_kept = np.zeros(3)
@@ -124,6 +129,7 @@ class LastPose:
         last, back = self._pose, exp(self._since_kept)
         before, knew_u = back.T @ self.u_in_c, self._knows_u
         self.u_in_c, self.omega_in_b, self._knows_u = np.zeros(3), np.zeros(3), False
+        self._followed += 1
         if last is not None and 0.0 < pose.t - last.t < MAX_STEP_S:
             shift = back @ pose.p_bc_in_c - last.p_bc_in_c
             self.u_in_c, self._knows_u = back.T @ shift / (pose.t - last.t), True
@@ -154,7 +160,7 @@ class LastPose:
         self._t_seen = -np.inf
 
     def _lose(self) -> None:
-        self._pose, self._R_cb, self._misses = None, None, 0
+        self._pose, self._R_cb, self._misses, self._followed = None, None, 0, 0
         self._kept = None
 
     def miss(self) -> None:
@@ -162,6 +168,8 @@ class LastPose:
         self._misses += 1
         if self._misses >= FORGET_MISSES:
             self._pose = None
+            if self._followed < FOLLOWED:
+                self._R_cb, self._followed = None, 0
 
     def predicted(self) -> Place | None:
         """Predict the pose at the newest picture, by both gyroscopes and the last velocity."""

@@ -10,6 +10,7 @@ from pipeline.prediction import Prediction
 from pipeline.signals import RelativePose
 from pipeline.vision.last_pose import (
     BLIND_M_S,
+    FOLLOWED,
     FORGET_MISSES,
     MEMORY_MOST_RAD,
     OLD,
@@ -31,6 +32,17 @@ def kept(p=(2.5, 0.2, 0.1), R=None, omega_c=STILL, omega_b=STILL):
     last = LastPose()
     last.advance(0.0, omega_c, omega_b)
     last.keep(pose_at(0.0, p, R), None)
+    return last
+
+
+def missed(last, since):
+    """After so many pictures without a pose that its place is forgotten."""
+    for k in range(FORGET_MISSES):
+        last.advance((since + k) * DT, STILL, STILL)
+        assert last.predicted() is not None
+        last.miss()
+    last.advance((since + FORGET_MISSES) * DT, STILL, STILL)
+    assert last.predicted() is None
     return last
 
 
@@ -66,15 +78,35 @@ def test_without_gyroscopes_the_place_goes_on_as_it_went():
         last.keep(pose_at(k * DT, (2.5, 0.01 * k, 0.0)), None)
 
 
-def test_the_place_is_forgotten_soon_and_the_attitude_later():
+@pytest.mark.parametrize("pictures", [1, FOLLOWED - 1, FOLLOWED])
+def test_the_place_is_forgotten_soon_and_later_the_attitude_of_whom_some_pictures_showed(pictures):
     last = kept()
-    for k in range(1, FORGET_MISSES + 1):
+    for k in range(1, pictures):
         last.advance(k * DT, STILL, STILL)
-        assert last.predicted() is not None
-        last.miss()
-    last.advance(4 * DT, STILL, STILL)
-    assert last.predicted() is None
-    assert last.attitude() is not None
+        last.keep(pose_at(k * DT, (2.5, 0.2, 0.1)), None)
+    missed(last, pictures)
+    assert (last.attitude() is not None) == (pictures == FOLLOWED)
+
+
+def test_whom_some_pictures_showed_is_remembered_though_the_next_shows_it_once():
+    last = kept()
+    for k in range(1, FOLLOWED):
+        last.advance(k * DT, STILL, STILL)
+        last.keep(pose_at(k * DT, (2.5, 0.2, 0.1)), None)
+    missed(last, FOLLOWED)
+    since = FOLLOWED + FORGET_MISSES + 1
+    last.advance(since * DT, STILL, STILL)
+    last.keep(pose_at(since * DT, (2.5, 0.2, 0.1)), None)
+    assert missed(last, since + 1).attitude() is not None
+
+
+def test_two_that_each_were_seen_once_are_not_one_that_was_seen_twice():
+    last = kept()
+    for k in range(FOLLOWED):
+        since = k * (FORGET_MISSES + 1) + 1
+        missed(last, since)
+        assert last.attitude() is None
+        last.keep(pose_at((since + FORGET_MISSES) * DT, (2.5, 0.2, 0.1)), None)
 
 
 @pytest.mark.parametrize(("omega", "least_s", "most_s"), [(STILL, 5.0, 20.0), (None, 0.1, 0.5)])

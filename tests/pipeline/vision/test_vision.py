@@ -10,7 +10,7 @@ from pipeline.frames import R_from_rpy
 from pipeline.signals import Frame
 from pipeline.vision.detection import FramePrior
 from pipeline.vision.gating import gate_rejection
-from pipeline.vision.last_pose import FORGET_MISSES, REACHED_S
+from pipeline.vision.last_pose import FOLLOWED, FORGET_MISSES, REACHED_S
 from pipeline.vision.robot_identity import ELSEWHERE
 from pipeline.vision.vision import Vision, warm_up
 from pipeline.vision_config import GatesConfig
@@ -101,12 +101,30 @@ def test_who_comes_back_is_known_by_the_attitude_that_the_gyroscopes_kept():
     truth = truth_at(rng)
     eye, still = vision(), np.zeros(3)
     sensors = FramePrior(None, None, still, still)
-    follow(eye, [truth], rng)
+    follow(eye, [truth] * FOLLOWED, rng)
     for k in range(30):
-        assert eye.step(Frame((1 + k) * DT, DARK), sensors).pose is None
+        assert eye.step(Frame((FOLLOWED + k) * DT, DARK), sensors).pose is None
     back = replace(truth, p=truth.p + np.array([0.1, 0.3, -0.1]))
-    (detection,) = follow(eye, [back], rng, start=31, covered=(2,), prior=sensors)
+    (detection,) = follow(eye, [back], rng, start=FOLLOWED + 30, covered=(2,), prior=sensors)
     assert not is_wrong(detection.pose, back)
+
+
+def test_what_looked_like_the_robot_in_one_picture_hides_it_no_longer_than_some_pictures():
+    """Lamps, once: then the robot, turned otherwise, among as many lamps as a room may have."""
+    rng = np.random.default_rng(60)
+    eye, looked_like = vision(), truth_at(rng)
+    follow(eye, [looked_like], rng)
+    robot = replace(looked_like, R=looked_like.R @ R_from_rpy(np.array([0.0, 0.0, 1.2])))
+    lamps = rng.uniform((40.0, 40.0), (CAMERA.width - 40.0, CAMERA.height - 40.0), (40, 2))
+    for k in range(1, 16):
+        frame = frame_at(k * DT, robot, rng)
+        for x, y in lamps.astype(int):
+            frame.luma[y - 2 : y + 3, x - 2 : x + 3] = 255
+        detection = eye.step(frame, robot.prior())
+        if detection.pose is not None:
+            break
+    assert k < 10
+    assert not is_wrong(detection.pose, robot)
 
 
 def test_forgetting_is_immediate():
