@@ -68,7 +68,9 @@ class MisplacedLeds:
         if 0.0 <= t - self._t_look < LOOK_S or len(spots) > MANY:
             return
         self._t_look = t
-        found = [self._sure(search, spots, hints) for search in self._searches]
+        loose, exact = (self._sure(search, spots, hints) for search in self._searches)
+        # what fits as well as the robot should is kept from being found by something else
+        found = [None if loose is not None and self._fits(loose) else loose, exact]
         self._shown = [
             shown + 1 if one is not None else 0
             for shown, one in zip(self._shown, found, strict=True)
@@ -88,6 +90,9 @@ class MisplacedLeds:
         if best is None or best.leds < len(self._leds_in_b) or best.log_false_alarms > SURE:
             return None
         return best
+
+    def _fits(self, one: Explanation) -> bool:
+        return one.squared_px <= one.leds * self._config.start_rms_px**2
 
     def _off_mm(self, one: Explanation) -> int:
         """How far the LEDs are off, one axis, RMS [mm]: the pose took six of their numbers."""

@@ -3,8 +3,18 @@
 import numpy as np
 import pytest
 
-from pipeline.vision.misplaced_leds import ELSEWHERE, LOOK_S, MIRROR, MIRRORED, SHOWN
+from pipeline.identification.relocalisation import SearchHints
+from pipeline.spots.leds import find_spots
+from pipeline.vision.misplaced_leds import (
+    ELSEWHERE,
+    LOOK_S,
+    MIRROR,
+    MIRRORED,
+    SHOWN,
+    MisplacedLeds,
+)
 from pipeline.vision.vision import LONG_IN_VAIN, Vision
+from pipeline.vision_config import IdentifyConfig, LedsConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, frame_at, moved, truth_at
 
 DT = 1.0 / 30.0
@@ -75,6 +85,18 @@ def test_of_a_robot_with_a_hidden_led_nothing_is_said():
     for seed in range(1, 7):
         said = set(reasons(measured(seed, 12.0), seed, covered=(1,)))
         assert not any("robot's" in reason for reason in said)
+
+
+@pytest.mark.parametrize(("off_mm", "is_said"), [(0.0, False), (12.0, True)])
+def test_leds_that_are_where_the_file_says_are_not_said_to_be_elsewhere(off_mm, is_said):
+    """Whatever keeps them from being found: something did, or nobody would look here."""
+    rng = np.random.default_rng(1)
+    truth, config = truth_at(rng), LedsConfig()
+    misplaced = MisplacedLeds(CAMERA, measured(1, off_mm), IdentifyConfig())
+    hints = SearchHints(truth.prior().up_in_c, truth.prior().up_in_b)
+    for k in range(SHOWN):
+        misplaced.look(k * LOOK_S, find_spots(frame_at(0.0, truth, rng), config), hints)
+    assert ("elsewhere" in misplaced.reason) == is_said
 
 
 def test_what_is_not_seen_look_after_look_is_not_said():
