@@ -33,7 +33,7 @@ REMEMBERED_PICTURES = 300
 """... and over so many it is learnt: ten seconds."""
 AVERAGED_S = 0.1
 """Over which the phone's accelerometer is averaged."""
-OLD_S = 0.15
+OLD_S = 0.3
 """An eye that rests on no picture newer than this is nobody's."""
 DATED_S = 1e-3
 """Standard deviation below which a time offset is told."""

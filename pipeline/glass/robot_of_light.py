@@ -16,7 +16,7 @@ from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import Array, R_from_wxyz
 from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, DisplayLagMeter
-from pipeline.glass.eye import Eye, EyeTracker
+from pipeline.glass.eye import OLD_S, Eye, EyeTracker
 from pipeline.glass.lag_tracker import LagTracker
 from pipeline.glass.lens_meter import SPREAD_S, TILT, GlassCorners, GlassViews, LensMeter
 from pipeline.glass.turn_meter import HeldTurning, TurnMeter
@@ -37,6 +37,10 @@ FARTHEST_WIDTHS = 2.5
 CORRECTED_S = 0.010
 """By so much at most a lag is corrected at once: the lights jump by it times their speed."""
 LOOK = "Point the phone at the screen, all four corners in the picture."
+LATE = (
+    "The phone's pictures come {late_ms:.0f} ms late, too late to show a robot by: use a 5 GHz Wi-Fi "
+    "or a cable."
+)
 SURE = 2.0
 """Standard deviations by which a lag must be wrong before it is corrected."""
 LEAST_PER_HEIGHT = 1.15
@@ -95,6 +99,8 @@ class RobotOfLight:
         self._turns = TurnMeter()
         self.eye: Eye | None = None
         """At the last step."""
+        self._late_s = 0.0
+        """How old the newest picture of the glass was when it came [s]."""
 
     def begin_camera(self, camera: Camera, *, is_guessed: bool) -> None:
         """Another camera films the glass now; one whose lens `is_guessed` is measured first."""
@@ -139,6 +145,7 @@ class RobotOfLight:
     def add_seen(self, seen: VisionMeasurement, lights_in_c: Array, now: float) -> None:
         """The phone has seen the glass, and lights in directions (n, 3), the brightest first."""
         self._eye.add_seen(seen, now)
+        self._late_s = now - seen.t
         if seen.pose is None:
             return
         self._turns.add_pose(seen.pose)
@@ -182,7 +189,9 @@ class RobotOfLight:
         self.eye = eye = self._eye.at(now)
         up_in_g = self._eye.up_in_g
         if eye is None or up_in_g is None or not eye.is_sure:
-            return Lights("search", LOOK)
+            late_s = self._late_s
+            is_late = late_s > OLD_S and eye is not None and eye.age < late_s + OLD_S
+            return Lights("search", LATE.format(late_ms=1e3 * late_s) if is_late else LOOK)
         if self.lag is None:
             return Lights("sweep", self._misplaced(eye))
         if not self.lag.is_fit(is_shown=self._is_shown):

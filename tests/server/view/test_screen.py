@@ -4,6 +4,7 @@ import contextlib
 import re
 import socket
 import threading
+from collections import deque
 from pathlib import Path
 
 import cv2
@@ -70,9 +71,12 @@ def make(truth_port):
         yield thread
 
 
-def filmed(thread, seconds, lag_s, since=0.0, R_cg=STRAIGHT):
-    """What the thread says at last, of a phone that holds still and films."""
-    pixels, still = CAMERA.pixels(AWAY + GLASS.fiducials() @ R_cg.T), np.zeros(3)
+def filmed(thread, seconds, lag_s, since=0.0, R_cg=STRAIGHT, late_s=0.0):
+    """What the thread says at last, of a phone that holds still and films.
+
+    Pictures come `late_s` after they were taken.
+    """
+    pixels, still, looks = CAMERA.pixels(AWAY + GLASS.fiducials() @ R_cg.T), np.zeros(3), deque()
     for k in range(int(60 * seconds)):
         t = since + k / 60.0
         thread.add(PhoneImu(t, still, np.array([0.0, 0.0, GRAVITY])))
@@ -80,7 +84,9 @@ def filmed(thread, seconds, lag_s, since=0.0, R_cg=STRAIGHT):
             seen = glass_seen(CAMERA, GLASS, np.arange(16), pixels, t)
             right = SWEEP_SHARE * GLASS.width_m * float(swept(np.array(t - lag_s)))
             light = AWAY + on_glass(np.array([[right, 0.0]])) @ R_cg.T
-            thread.add(GlassLook(seen, light, GlassCorners(t, np.arange(16), pixels)))
+            looks.append(GlassLook(seen, light, GlassCorners(t, np.arange(16), pixels)))
+        while looks and looks[0].seen.t + late_s <= t:
+            thread.add(looks.popleft())
         lights = thread.step(t + 0.01)
     return lights
 
@@ -163,7 +169,18 @@ def test_who_films_a_glass_that_stands_still_tells_when_pictures_are_taken(make)
 def test_a_phone_that_looks_away_loses_the_light(make):
     thread = make()
     assert filmed(thread, 3.5, 0.03).phase == "robot"
-    assert thread.step(3.75).phase == "search"
+    assert thread.step(3.6).phase == "robot"
+    assert thread.step(3.85).phase == "search"
+    assert "four corners" in thread.why
+
+
+@pytest.mark.parametrize(("late_s", "phase"), [(0.2, "robot"), (0.4, "search")])
+def test_pictures_may_be_late_and_that_they_are_too_late_is_told(make, late_s, phase):
+    thread = make()
+    assert filmed(thread, 3.5, 0.03, late_s=late_s).phase == phase
+    assert bool(re.search("pictures come 4[0-9]{2} ms late", thread.why)) == (phase == "search")
+    thread.step(4.5)
+    assert "four corners" in thread.why  # none come any more
 
 
 def test_a_robot_larger_than_the_screen_is_not_shown_on_it(make):
