@@ -8,6 +8,7 @@ seconds, with a place beside of each light's own, for fiducials and file may be 
 from __future__ import annotations
 
 from collections import deque
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -20,10 +21,10 @@ PATH_S: Final = 0.5
 """Places are remembered for so long: a picture may come late."""
 NEAR_M: Final = 0.008
 """A light farther from any place is none of the robot's."""
-LEAST: Final = 100
-"""Lights, before anything is said."""
-ALIKE: Final = 15.0
-"""So many lights in a row err alike: all of some pictures, by the eye's own error."""
+LEAST_S: Final = 1.0
+"""Of lights, before anything is said."""
+ALIKE_S: Final = 0.3
+"""Lights within it err alike, by the eye's own error."""
 
 
 class LagTracker:
@@ -56,11 +57,17 @@ class LagTracker:
         while self._seen and t - self._seen[0][0] > WINDOW_S:
             self._seen.popleft()
 
+    def corrected(self, by_s: float) -> None:
+        """So much less is believed of the lag from now on: what was seen is as if it always was."""
+        self._seen = deque(
+            (t, led, beside - by_s * velocity, velocity) for t, led, beside, velocity in self._seen
+        )
+
     def error(self) -> DisplayLag | None:
         """What is believed of the lag, less what it is; None while nobody can say."""
-        if len(self._seen) < LEAST:
+        if not self._seen or self._seen[-1][0] - self._seen[0][0] < LEAST_S:
             return None
-        _, leds, besides, velocities = zip(*self._seen, strict=True)
+        t, leds, besides, velocities = zip(*self._seen, strict=True)
         led, r, v = np.array(leds), np.array(besides), np.array(velocities)
         for one in np.unique(led):
             r[led == one] -= r[led == one].mean(axis=0)
@@ -69,8 +76,10 @@ class LagTracker:
         if moved == 0.0:
             return None
         value = float((v * r).sum()) / moved
-        rms = float(np.sqrt(np.mean(np.square(r - value * v))))
-        found = DisplayLag(value, rms * float(np.sqrt(ALIKE / moved)))
+        spans = ((np.array(t) - t[-1]) / ALIKE_S).astype(int)
+        scores = np.bincount(-spans, ((r - value * v) * v).sum(axis=1))
+        few = len(scores) / (len(scores) - 1.0)
+        found = DisplayLag(value, float(np.linalg.norm(scores)) / moved * sqrt(few))
         return found if found.sigma < SURE_S else None
 
     def _at(self, t: float) -> tuple[Array, Array] | None:

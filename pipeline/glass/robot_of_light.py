@@ -29,17 +29,20 @@ PathAhead = Callable[[float], Sequence[tuple[float, Array, Array]]]
 """Where the robot goes within so long [s], oldest first: (t [s], wxyz_fb, p_bf_in_f [m])."""
 STEP_S = 0.01
 """Between the places of a light that are told at once."""
+DRAWN = 2
+"""Of the places that are told at once, the one that the page draws from: on its way, and until the
+next frame, 20 ms pass. The others are told again, as they are then known."""
 HORIZON_S = 0.06
 """So far beyond the display lag: the way to the page, and a frame of the glass."""
 NEAREST_M = 0.30
 FARTHEST_WIDTHS = 2.5
 """Beyond, in widths of the glass, the LEDs are too small in the picture."""
-CORRECTED_S = 0.010
-"""By so much at most a lag is corrected at once: the lights jump by it times their speed."""
+CORRECTED_S = 0.003
+"""By so much at most a picture corrects a lag: the lights jump by it times their speed."""
 LOOK = "Point the phone at the screen, all four corners in the picture."
 LATE = (
-    "The phone's pictures come {late_ms:.0f} ms late, too late to show a robot by: use a 5 GHz Wi-Fi "
-    "or a cable."
+    "The phone's pictures come {late_ms:.0f} ms late, too late to show a robot by: "
+    "use a 5 GHz Wi-Fi or a cable."
 )
 SURE = 2.0
 """Standard deviations by which a lag must be wrong before it is corrected."""
@@ -179,7 +182,7 @@ class RobotOfLight:
         if error is not None and abs(error.value) > SURE * error.sigma:
             step = min(max(error.value, -CORRECTED_S), CORRECTED_S)
             self.lag = DisplayLag(lag.value - step, error.sigma)
-            self._tracker = LagTracker()  # what was seen rests on the lag of then
+            self._tracker.corrected(step)
 
     def step(self, now: float, robot: PathAhead) -> Lights:
         """What to show from `now` [s] on."""
@@ -214,7 +217,7 @@ class RobotOfLight:
             i = int(np.abs(times - t).argmin())  # of a path with a step of a few milliseconds
             leds_in_g = hanging.leds_in_g(R_from_wxyz(wxyz[i]), p[i], self._leds_in_b)
             places[k] = pierced(eye.at(t), leds_in_g)
-        self._tracker.add_drawn(start, places[0])
+        self._tracker.add_drawn(start + DRAWN * STEP_S, places[DRAWN])
         self._is_shown = True
         return Lights("robot", self._misplaced(eye), start, places)
 

@@ -29,10 +29,10 @@ from server.control.process import teleop_config
 from server.experiments import processes
 from server.experiments.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
-from server.simulation.figures import SETTLE_S, result_of, rms
+from server.simulation.figures import SETTLE_S, rms
 from server.simulation.screen import FRAMES_HZ, Display, ScreenSimulation
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
-from server.virtual_phone.phone_script import DEVICE
+from server.virtual_phone.phone_script import DEVICE, Manners, VirtualOperator
 
 REAL: Final = "real"
 LAGS_MS: Final = (20.0, 40.0, 60.0)
@@ -45,8 +45,10 @@ cropped by a stabiliser."""
 MIDDLE_PX: Final = (8.0, -6.0)
 """Where their middles are, beside the picture's."""
 READOUT_S: Final = 0.020
+PRESS_S: Final = 7.0
+"""When it is led: by then a screen is found, lag and lens are measured, the robot is armed."""
 MOST_BEFORE_S: Final = 12.0
-"""Until it is led: the screen is found, its lag measured, the robot armed."""
+"""Until it is led, at most."""
 REFUSED_S: Final = 6.0
 """By then a robot that is not refused is led."""
 MOST_RATIO: Final = 1.3
@@ -81,7 +83,10 @@ class ScreenFlight:
     case: str
     seed: int
     rms_mm: float
+    """As far as it was led to where it can go."""
     max_mm: float
+    beyond_pct: float
+    """Of the time it was led to where it can't."""
     lag_ms: float
     """How late light was, on average; NaN where there was no screen."""
     found_ms: float
@@ -102,6 +107,7 @@ class ScreenRow:
     worst_mm: float
     """RMS of the worst flight."""
     max_mm: float
+    beyond_pct: float
     lag_ms: float
     off_ms: float
     """By how much the lag was misjudged, at most."""
@@ -124,6 +130,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
     ("ratio", "to real", "{:.2f}"),
     ("worst_mm", "worst mm", "{:.2f}"),
     ("max_mm", "max mm", "{:.1f}"),
+    ("beyond_pct", "beyond %", "{:.0f}"),
     ("lag_ms", "lag ms", "{:.1f}"),
     ("off_ms", "off ms", "{:.1f}"),
 )
@@ -172,12 +179,17 @@ class ScreenSetting:
             start = replace(robot_file.start, distance=share * robot_file.start.distance)
             robot_file = replace(robot_file, start=start)
             scene = replace(scene, camera=camera, knows_camera=False)
-        return ScreenSimulation(robot_file, self.config, scene, display)
+        return ScreenSimulation(robot_file, self.config, scene, display, _patient())
 
     def real(self, seed: int) -> VirtualTimeSimulation:
         """At rest before the robot itself."""
         scene = SimulationOptions(hand=self.hand, seed=seed)
-        return VirtualTimeSimulation(self.robot_file, self.config, scene)
+        return VirtualTimeSimulation(self.robot_file, self.config, scene, _patient())
+
+
+def _patient() -> VirtualOperator:
+    """Presses at the same moment whatever is led: then the hand goes the same way."""
+    return VirtualOperator(Manners(not_before_s=PRESS_S))
 
 
 def fly(setting: ScreenSetting, seconds: float, job: tuple[ScreenCase, int]) -> ScreenFlight:
@@ -192,12 +204,22 @@ def fly(setting: ScreenSetting, seconds: float, job: tuple[ScreenCase, int]) -> 
         lag = screen.robot_of_light.lag
         lag_ms = 1e3 * float(np.mean(screen.drawn_before_s or [nan]))
         found_ms = 1e3 * lag.value if lag is not None else nan
-    figures = result_of(simulation.trace, simulation.scene, 0.0)
-    is_whole = figures.tracked_s >= seconds - SETTLE_S - PERIOD_S
-    ended = figures.ended or ("" if is_whole else f"{simulation.t:.1f} s: it was not led")
+    trace, skip = simulation.trace, round(SETTLE_S / PERIOD_S)
+    beyond = np.array(trace.at_limit[skip:], dtype=np.bool_)
+    errors_in_f = np.reshape(trace.error_in_f, (-1, 3))[skip:]
+    off_mm = 1e3 * np.linalg.norm(errors_in_f[~beyond], axis=1)
+    is_whole = len(trace.t) * PERIOD_S >= seconds - PERIOD_S
+    ended = trace.left or ("" if is_whole else f"{simulation.t:.1f} s: it was not led")
     return ScreenFlight(
-        case.name, seed, figures.rms_mm, figures.max_mm, lag_ms, found_ms, ended
-    )  # fmt: skip
+        case=case.name,
+        seed=seed,
+        rms_mm=rms(off_mm),
+        max_mm=float(off_mm.max(initial=0.0)),
+        beyond_pct=100.0 * float(beyond.mean()) if len(beyond) else nan,
+        lag_ms=lag_ms,
+        found_ms=found_ms,
+        ended=ended,
+    )
 
 
 def _lead(simulation: VirtualTimeSimulation, seconds: float) -> None:
@@ -233,6 +255,7 @@ def _row(name: str, some: Sequence[ScreenFlight], real_mm: float) -> ScreenRow:
         ratio=rms_mm / real_mm,
         worst_mm=max((one.rms_mm for one in some), key=_nan_last),
         max_mm=max((one.max_mm for one in some), key=_nan_last),
+        beyond_pct=float(np.mean([one.beyond_pct for one in some])),
         lag_ms=float(np.mean([one.lag_ms for one in some])),
         off_ms=max((one.found_ms - one.lag_ms for one in some), key=lambda ms: _nan_last(abs(ms))),
         ended=next((one.ended for one in some if one.ended), ""),

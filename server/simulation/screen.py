@@ -24,6 +24,7 @@ from pipeline.vision.detection import Detection
 from server.phone.frame_pipeline import FramePipeline
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 from server.view.glass_watch import GlassWatch
+from server.virtual_phone.phone_script import VirtualOperator
 
 INCHES_24 = Glass(0.53, 0.30)
 FRAMES_HZ = 60.0
@@ -56,10 +57,11 @@ class ScreenSimulation(VirtualTimeSimulation):
         config: TeleopConfig,
         scene: SimulationOptions,
         display: Display,
+        operator: VirtualOperator | None = None,
         hand: Hand | None = None,
     ) -> None:
         """Everything at rest at time 0, the robot not shown yet."""
-        super().__init__(robot_file, config, scene, hand=hand)
+        super().__init__(robot_file, config, scene, operator, hand)
         leds_in_b = robot_file.robot.leds_in_b
         self._robot, self._gates = robot_file.robot, config.gates
         self._display, self._rest_in_f = display, leds_in_b.mean(axis=0)

@@ -29,6 +29,8 @@ class TrackingTrace:
     """Estimated minus true relative position (3,) [m]."""
     thrusts: list[Array] = field(default_factory=list)
     saturated: list[bool] = field(default_factory=list)
+    at_limit: list[bool] = field(default_factory=list)
+    """It was led to where it can't go."""
     intended_in_f: list[Array] = field(default_factory=list)
     body_in_f: list[Array] = field(default_factory=list)
     pictures: int = 0
@@ -68,6 +70,7 @@ class TrackingEvaluator:
         trace.body_in_f.append(body[1])
         trace.thrusts.append(output.thrusts)
         trace.saturated.append(output.saturated)
+        trace.at_limit.append(output.at_limit)
         if output.relative is not None:
             p_bc_in_c = output.relative.p_bc_in_c
             trace.estimate_error_in_c.append(p_bc_in_c - hand[0].T @ (body[1] - hand[1]))

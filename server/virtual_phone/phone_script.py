@@ -36,6 +36,8 @@ class Manners:
     """A press that changed nothing is given up after this, and soon made anew."""
     pause_s: float = 1.0
     """Before a press after HOLD, and between requests to arm."""
+    not_before_s: float = -np.inf
+    """No press while ARMED before this time."""
     again: bool = True
     """After HOLD press again, after DISARMED arm again; else once is enough."""
 
@@ -81,7 +83,7 @@ class VirtualOperator:
         if self.mode in ("TRACK", "COAST"):
             return self._held
         if self.mode == "ARMED":
-            waited -= manners.press_after_s
+            waited = min(waited - manners.press_after_s, t - manners.not_before_s)
         elif self.mode == "HOLD" and manners.again:
             waited -= manners.pause_s
         else:

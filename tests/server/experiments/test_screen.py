@@ -11,11 +11,14 @@ from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from server.control.process import teleop_config
 from server.experiments.screen import (
+    PRESS_S,
     REAL,
     RefusedScreen,
+    ScreenCase,
     ScreenFlight,
     ScreenSetting,
     cases,
+    fly,
     goals,
     refused,
     rows_of,
@@ -23,10 +26,10 @@ from server.experiments.screen import (
 )
 
 FLOWN = [
-    ScreenFlight(REAL, 1000, 3.0, 9.0, nan, nan, ""),
-    ScreenFlight(REAL, 1001, 4.0, 8.0, nan, nan, ""),
-    ScreenFlight("40 ms", 1000, 4.0, 11.0, 48.0, 46.0, ""),
-    ScreenFlight("40 ms", 1001, 4.5, 10.0, 48.0, 49.0, ""),
+    ScreenFlight(REAL, 1000, 3.0, 9.0, 0.0, nan, nan, ""),
+    ScreenFlight(REAL, 1001, 4.0, 8.0, 0.0, nan, nan, ""),
+    ScreenFlight("40 ms", 1000, 4.0, 11.0, 10.0, 48.0, 46.0, ""),
+    ScreenFlight("40 ms", 1001, 4.5, 10.0, 30.0, 48.0, 49.0, ""),
 ]
 REFUSED = [RefusedScreen("100 ms", False, "too late")]
 
@@ -36,6 +39,7 @@ def test_a_row_is_over_all_flights_and_names_the_worst() -> None:
     assert real.ratio == 1.0
     assert (late.flights, late.worst_mm, late.max_mm) == (2, 4.5, 11.0)
     assert late.ratio == pytest.approx(((4.0**2 + 4.5**2) / (3.0**2 + 4.0**2)) ** 0.5)
+    assert late.beyond_pct == 20.0
     assert late.off_ms == -2.0
 
 
@@ -74,6 +78,20 @@ def test_every_case_is_another_one() -> None:
     names = [case.name for case in (*cases(), *unfit())]
     assert len(set(names)) == len(names)
     assert all(case.display is None for case in cases() if case.name == REAL)
+
+
+@pytest.mark.slow
+def test_how_far_it_is_off_where_it_is_led_beyond_its_reach_counts_for_nothing() -> None:
+    """The hand of this seed leads a third of the way to where no thruster holds the robot."""
+    robot_file = load_robot("screen")
+    config = teleop_config(robot_file, "phone", TeleopConfig().virtual_camera, "relative")
+    setting = ScreenSetting(robot_file, config, "moving")
+    flight = fly(setting, 8.0, (ScreenCase(REAL), 1003))
+    assert not flight.ended
+    assert flight.beyond_pct > 20.0
+    assert flight.rms_mm < 5.0
+    trace = setting.real(1003).run(PRESS_S + 8.0)
+    assert max(abs(error).max() for error in trace.error_in_f) > 0.02
 
 
 @pytest.mark.slow

@@ -76,6 +76,15 @@ def test_operator_presses_after_armed_and_holds_while_tracking():
     assert touches[-1][2] == 1
 
 
+@pytest.mark.parametrize(("armed_s", "pressed_s"), [(0.5, 3.0), (2.9, 3.6)])
+def test_who_is_patient_presses_at_a_given_time_or_once_it_is_armed(armed_s, pressed_s):
+    operator = VirtualOperator(Manners(not_before_s=3.0))
+    touches, _ = watch(operator, [("DISARMED", False, armed_s), ("ARMED", False, 3.0)])
+    pressed = [t for t, held, _ in touches if held]
+    assert pressed[0] == pytest.approx(pressed_s, abs=0.06)
+    assert all(held for t, held, _ in touches if pressed[0] < t < pressed[0] + 0.9)
+
+
 def test_a_press_that_changes_nothing_is_given_up_and_made_anew():
     touches, _ = watch(VirtualOperator(), [("ARMED", False, 3.2)])
     edges = [b[1] for a, b in itertools.pairwise(touches) if a[1] != b[1]]
