@@ -40,6 +40,11 @@ FARTHEST_WIDTHS = 2.5
 CORRECTED_S = 0.003
 """By so much at most a picture corrects a lag: the lights jump by it times their speed."""
 LOOK = "Point the phone at the screen, all four corners in the picture."
+LAGS = (
+    "This screen shows everything {late_ms:.0f} ms late, which is too late to lead by: choose its "
+    "game mode, or another one."
+)
+LEADS = "The light is seen before it is drawn: the clocks are not known yet. Wait a moment."
 LATE = (
     "The phone's pictures come {late_ms:.0f} ms late, too late to show a robot by: "
     "use a 5 GHz Wi-Fi or a cable."
@@ -89,7 +94,7 @@ class RobotOfLight:
         """Nothing is known of the phone and of the display."""
         self.glass, self._leds_in_b = glass, leds_in_b
         self._eye = EyeTracker(glass)
-        self._meter = DisplayLagMeter(SWEEP_SHARE * glass.width_m)
+        self._meter = self._new_meter()
         self._tracker = LagTracker()
         self._lens: LensMeter | None = None
         """None: the lens is calibrated, or was measured."""
@@ -109,11 +114,14 @@ class RobotOfLight:
         """Another camera films the glass now; one whose lens `is_guessed` is measured first."""
         self._eye, self.eye = EyeTracker(self.glass), None
         # through another lens lights seem elsewhere, which a meter would take for a lag
-        self._meter = DisplayLagMeter(SWEEP_SHARE * self.glass.width_m)
+        self._meter = self._new_meter()
         self._tracker, self._is_shown = LagTracker(), False
         self._lens = LensMeter(camera, self.glass) if is_guessed else None
         self._turns = TurnMeter()
         self._views = GlassViews(camera, self.glass, SPREAD_S)
+
+    def _new_meter(self) -> DisplayLagMeter:
+        return DisplayLagMeter(SWEEP_SHARE * self.glass.width_m)
 
     def lens_of(self, camera: Camera) -> SimpleLens | None:
         """What a camera that was guessed truly has, once it is measured."""
@@ -156,11 +164,18 @@ class RobotOfLight:
             return
         R_gc = seen.pose.R_cb.T
         places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
-        if self.lag is None:
+        if self.lag is None or not self._is_fit(self.lag):
             self._measure(seen.t, places)
         else:
             self._tracker.add_seen(seen.t, places[self.glass.has(places)])
             self._follow(self.lag, seen.t)
+
+    def _is_fit(self, lag: DisplayLag) -> bool:
+        """Whether it may be led by; one that no longer is, is measured from nothing."""
+        is_fit = lag.is_fit(is_shown=self._is_shown)
+        if not is_fit and self._is_shown:
+            self._is_shown, self._meter = False, self._new_meter()
+        return is_fit
 
     def _measure(self, t: float, places: Array) -> None:
         """Take where a light sweeps: the brightest of all on its line, clear of the fiducials.
@@ -172,7 +187,9 @@ class RobotOfLight:
         sweeps &= right < SWEEP_SHARE * self.glass.width_m + 0.5 * self.glass.tile_m
         if sweeps.any():
             self._meter.add_position(t, float(places[sweeps][0, 0]))
-            self.lag, self._t_lag = self._meter.lag(), t
+            found = self._meter.lag()
+            if found is not None:
+                self.lag, self._t_lag, self._tracker = found, t, LagTracker()
 
     def _follow(self, lag: DisplayLag, t: float) -> None:
         """Correct a lag that the robot's own lights deny."""
@@ -197,11 +214,10 @@ class RobotOfLight:
             return Lights("search", LATE.format(late_ms=1e3 * late_s) if is_late else LOOK)
         if self.lag is None:
             return Lights("sweep", self._misplaced(eye))
-        if not self.lag.is_fit(is_shown=self._is_shown):
-            self._is_shown = False
+        if not self._is_fit(self.lag):
+            # measured on: another mode of the display, or clocks that are known by then, mend it
             late_ms = 1e3 * self.lag.value
-            return Lights("search", f"This screen shows everything {late_ms:.0f} ms late, which is "
-                          "too late to lead by: choose its game mode, or another one.")  # fmt: skip
+            return Lights("sweep", LAGS.format(late_ms=late_ms) if late_ms > 0.0 else LEADS)
         if self._lens is not None:
             return Lights("search", self._misplaced(eye) or TILT)
         return self._shown(eye, up_in_g, now, robot)

@@ -123,12 +123,16 @@ def test_a_lens_that_was_guessed_is_measured_before_the_robot_is_shown(make):
     assert filmed(thread, 1.0, 0.03, since=9.0).phase == "robot"
 
 
-def test_a_screen_that_is_too_late_is_told_so_and_shows_no_robot(make):
+@pytest.mark.parametrize(("lag_s", "why"), [(0.09, "90 ms late"), (-0.06, "before it is drawn")])
+def test_a_screen_that_is_too_late_is_told_so_and_measured_until_it_is_not(make, lag_s, why):
     thread = make()
-    lights = filmed(thread, 3.5, 0.09)
-    assert lights.phase == "search"
-    assert "90 ms late" in lights.why
+    lights = filmed(thread, 3.5, lag_s)
+    assert lights.phase == "sweep"
+    assert why in lights.why
     assert lights.places_mm == []
+    lights = filmed(thread, 5.5, 0.03, since=3.5)  # it has another mode now
+    assert lights.phase == "robot"
+    assert lights.lag_ms == pytest.approx(30.0, abs=10.0)  # the rest is seen by the robot's lights
 
 
 def test_a_lag_that_is_corrected_beyond_what_is_fit_is_borne_a_little_by_who_leads(make):
@@ -138,15 +142,15 @@ def test_a_lag_that_is_corrected_beyond_what_is_fit_is_borne_a_little_by_who_lea
     assert filmed(thread, 3.5, 0.075).phase == "robot"
     for since, lag_s, phase in (
         (3.5, MOST_LAG_S + 0.8 * BORNE_S, "robot"),
-        (3.6, MOST_LAG_S + 1.2 * BORNE_S, "search"),
-        (3.7, MOST_LAG_S + 0.8 * BORNE_S, "search"),
+        (3.6, MOST_LAG_S + 1.2 * BORNE_S, "sweep"),
+        (3.7, MOST_LAG_S + 0.8 * BORNE_S, "sweep"),
         (3.8, MOST_LAG_S - 0.001, "robot"),
     ):
         robot.lag = DisplayLag(lag_s, 0.001)
         assert filmed(thread, 0.1, 0.075, since=since).phase == phase
     robot.lag = DisplayLag(MOST_LAG_S + 0.8 * BORNE_S, 0.001)
     thread.add(NewCamera(CAMERA, is_guessed=False))
-    assert filmed(thread, 1.0, 0.075, since=3.9).phase == "search"
+    assert filmed(thread, 1.0, 0.075, since=3.9).phase == "sweep"
 
 
 def test_who_films_a_glass_that_stands_still_tells_when_pictures_are_taken(make):

@@ -361,6 +361,7 @@ export const SERVER = {
   "Tilt the phone a little: its lens is being measured.": "Inclinez un peu le téléphone : mesure de son objectif.",
   "Point the phone at the screen, all four corners in the picture.": "Visez l’écran, ses quatre coins dans l’image.",
   "The phone's pictures come {} ms late, too late to show a robot by: use a 5 GHz Wi-Fi or a cable.": "Les images du téléphone arrivent avec {} ms de retard, trop pour montrer un robot : prenez un Wi-Fi à 5 GHz ou un câble.",
+  "The light is seen before it is drawn: the clocks are not known yet.": "La lumière est vue avant d’être dessinée : les horloges ne sont pas encore connues.",
   "The phone is too far away: come nearer.": "Le téléphone est trop loin : approchez-vous.",
   "The phone is too near: go back a little.": "Le téléphone est trop près : reculez un peu.",
   "This robot does not fit the screen: choose a larger screen, or start with --robot screen.": "Ce robot ne tient pas dans l’écran : prenez un écran plus grand, ou démarrez avec --robot screen.",

@@ -1,0 +1,112 @@
+"""A robot of light led through a screen's page in a real Chromium, to what it is in virtual time.
+
+    python -m tests.bench.bench_screen [--robots screen,so101] [--seconds 60] [--seed 1000]
+
+The page, the server's processes and the sockets are real; what the page draws, frame by frame, is
+filmed by a virtual phone, which draws its pictures on the same machine: 15 a second.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from hardware.robot_file import COMMANDS, load_robot
+from pipeline.config import PERIOD_S, TeleopConfig
+from server.common.options import Parser
+from server.common.ranges import number, seed_number
+from server.common.text import Column, dashed
+from server.control.process import teleop_config
+from server.simulation.figures import rms, rows_of
+from server.simulation.screen import Display, ScreenSimulation
+from server.simulation.virtual_time import SimulationOptions
+from tests.e2e.conftest import wanted_chromium
+from tests.e2e.drawn_glass import GLASS, LAG_S, TILT_RAD
+from tests.e2e.screen_rig import PICTURES_HZ, lead
+
+HANDS: Final = {"screen": "moving", "so101": "filming"}
+BEFORE_S: Final = 12.0
+"""Until it is led in virtual time, at most."""
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("robot", "robot", "{}"),
+    ("hand", "hand", "{}"),
+    ("tracked_s", "tracked s", "{:.0f}"),
+    ("rms_mm", "RMS mm", "{:.2f}"),
+    ("virtual_mm", "virtual time mm", "{:.2f}"),
+    ("ratio", "ratio", "{:.2f}"),
+    ("frames_hz", "frames Hz", "{:.1f}"),
+    ("pictures_hz", "pictures Hz", "{:.1f}"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One flight; see `ScreenFlown`."""
+
+    robot: str
+    hand: str
+    tracked_s: float
+    rms_mm: float
+    virtual_mm: float
+    """The same hand's, in virtual time."""
+    ratio: float
+    frames_hz: float
+    pictures_hz: float
+
+
+def in_virtual_time(robot: str, hand: str, seed: int, seconds: float) -> float:
+    """RMS error [mm] since the press."""
+    robot_file = load_robot(robot, takes=COMMANDS)
+    camera = TeleopConfig().virtual_camera
+    config = teleop_config(robot_file, "phone", camera, "relative")
+    scene = SimulationOptions(hand=hand, seed=seed, frame_rate_hz=PICTURES_HZ)
+    simulation = ScreenSimulation(robot_file, config, scene, Display(GLASS, LAG_S, TILT_RAD))
+    trace = simulation.trace
+    while simulation.t < BEFORE_S + seconds and len(trace.t) * PERIOD_S < seconds:
+        simulation.advance()
+    return 1e3 * rms(np.linalg.norm(rows_of(trace.error_in_f), axis=1))
+
+
+def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
+    """One flight in real time, one in virtual time."""
+    hand = HANDS[robot]
+    with tempfile.TemporaryDirectory() as folder:
+        flown = lead(chromium, Path(folder), robot, hand, seed, seconds)
+    virtual_mm = in_virtual_time(robot, hand, seed, seconds)
+    return Row(
+        robot=robot,
+        hand=hand,
+        tracked_s=flown.tracked_s,
+        rms_mm=flown.rms_mm,
+        virtual_mm=virtual_mm,
+        ratio=flown.rms_mm / virtual_mm,
+        frames_hz=flown.frames_hz,
+        pictures_hz=flown.pictures_hz,
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Fly and print."""
+    parser = Parser(prog="bench_screen", description=__doc__,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    parser.add_argument("--robots", default=",".join(HANDS), help=", ".join(HANDS))
+    parser.add_argument("--seconds", type=number(5.0, 600.0), default=60.0, help="each is led")
+    parser.add_argument("--seed", type=seed_number, default=1000, help="of the hand")
+    arguments = parser.parse_args(argv)
+    robots = arguments.robots.split(",")
+    if not set(robots) <= set(HANDS):
+        parser.error(f"--robots {arguments.robots}: allowed: {', '.join(HANDS)}")
+    chromium = wanted_chromium()
+    rows = [fly(chromium, robot, arguments.seed, arguments.seconds) for robot in robots]
+    sys.stdout.write(f"{dashed(COLUMNS, rows)}\n")
+
+
+if __name__ == "__main__":
+    main()

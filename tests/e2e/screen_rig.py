@@ -1,0 +1,104 @@
+"""A robot of light, led for real: the page in Chromium, the server's processes, a virtual phone."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from hardware.camera_file import find_camera
+from hardware.codec import Encoder
+from hardware.robot_file import COMMANDS, load_robot
+from hardware.sim.hand import make_hand
+from hardware.sim.phone import PhoneOptions, VirtualPhone
+from hardware.sim.render import RenderOptions
+from server.common import clock
+from server.common.access import Access
+from server.virtual_phone.live_phone import LivePhone
+from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
+from tests.e2e.chromium_phone import browser
+from tests.e2e.drawn_glass import SIZE, DrawnGlass
+from tests.e2e.serving import serving
+
+WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
+PICTURES_HZ: Final = 15.0
+"""A picture of the glass takes 40 ms to draw, beside all that is measured."""
+REST_S: Final = 8.0
+"""Until the hand moves: by then it is led."""
+BEFORE_S: Final = 12.0
+"""Until it is led, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenFlown:
+    """What came of it."""
+
+    tracked_s: float
+    rms_mm: float
+    """All of it."""
+    frames_hz: float
+    """Of the page."""
+    pictures_hz: float
+    """Of the phone."""
+    said: tuple[str, ...]
+    """By the server, in turn: its mode, and why."""
+
+
+def lead(
+    chromium: str, folder: Path, robot: str, hand: str, seed: int, seconds: float
+) -> ScreenFlown:
+    """Lead for so long by a phone that films the page's glass."""
+    robot_file = load_robot(robot, takes=COMMANDS)
+    leds_in_b, axes = robot_file.robot.leds_in_b, robot_file.robot.axes
+    viewport = {"width": SIZE[0], "height": SIZE[1]}
+    with (
+        serving(folder, "--robot", robot) as server,
+        browser(chromium, viewport=viewport) as context,
+    ):
+        held = make_hand(
+            hand, seed=seed, start=robot_file.start, t_start=clock.now(), rest_s=REST_S
+        )
+        glass = DrawnGlass(context, server, held, leds_in_b.mean(axis=0))
+        camera, rng = find_camera(DEVICE, WIDTH, HEIGHT), np.random.default_rng((seed, 3))
+        options = PhoneOptions(frame_rate_hz=PICTURES_HZ)
+        phone = VirtualPhone(camera, held, leds_in_b, RenderOptions(), rng, options)
+        phone.films = glass.film
+        encoder = Encoder(WIDTH, HEIGHT, PICTURES_HZ, BITRATE_BPS, "h264")
+        script = PhoneScript(phone, encoder, VirtualOperator())
+        access = Access(server.http_url, server.operator_token, server.truth_port, robot)
+        said: list[str] = []
+        frames_hz: list[float] = []
+
+        def report(live: LivePhone) -> None:
+            frames_hz.append(glass.frames_hz())
+            words = f"{live.status.mode}: {live.status.reason}" if live.status else ""
+            if words not in said[-1:]:
+                said.append(words)
+            if live.score.tracked_s > seconds:
+                live.leave()
+
+        async def fly() -> LivePhone:
+            live = LivePhone(access, script, server.truth_port, axes)
+            await live.run(BEFORE_S + seconds, report)
+            return live
+
+        flown: list[LivePhone] = []
+        thread = threading.Thread(target=lambda: flown.append(asyncio.run(fly())), name="phone")
+        began = clock.now()
+        thread.start()
+        while thread.is_alive():
+            glass.page.wait_for_timeout(200.0)
+        took_s = clock.now() - began
+        glass.close()
+        (live,) = flown
+        return ScreenFlown(
+            tracked_s=live.score.tracked_s,
+            rms_mm=1e3 * live.score.rms_m,
+            frames_hz=float(np.median(frames_hz)),
+            pictures_hz=live.sent / took_s,
+            said=tuple(said),
+        )
