@@ -35,10 +35,10 @@ from pipeline.estimation.sample_noise import SampleNoise
 from pipeline.estimation.told_motion import ToldTwist, ToldVertical
 from pipeline.estimation.tones import PHONE, ROBOT, Tones
 from pipeline.estimator_config import RelativeConfig
-from pipeline.frames import Array, cross
+from pipeline.frames import Array, cross, exp
 from pipeline.imu_stream import ImuStream
 from pipeline.robot import ToldMotion
-from pipeline.signals import BodyImu, Flags, VisionMeasurement
+from pipeline.signals import BodyImu, Flags, StampOffset, VisionMeasurement
 
 KEPT: Final = 2 * WINDOW
 """Samples up to the base that are still interpolated from, or learnt from."""
@@ -162,6 +162,19 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         variances = np.zeros(len(self.base.P))
         variances[OFFSET] = sigma * sigma
         self.open(variances)
+
+    def date(self, offset: StampOffset) -> None:
+        """Pictures since the base are dated as somebody else found, who is surer."""
+        base = self.base
+        known = base.P[OFFSET].copy()
+        gain = known / (known[OFFSET] + offset.sigma**2)
+        step = gain * (offset.value - base.x[X_OFFSET])
+        base.x[0:3] += step[0:3]
+        base.x[3:] += step[6:]
+        base.R[:] = base.R @ exp(step[3:6])
+        base.P -= np.outer(gain, known)
+        self._replay_from = min(self._replay_from, base.t)
+        self._repair()
 
     def walk(self, densities: Array) -> None:
         """Biases walk by `densities` (4,) [unit²/s] more than configured, by sensor."""

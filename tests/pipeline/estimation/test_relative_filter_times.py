@@ -1,12 +1,14 @@
 """When things reach the default estimator, and when it is asked."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hardware.sim.world.sensors import events, feed, give
 from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimation.estimator import Fusion
-from pipeline.signals import VisionMeasurement
+from pipeline.signals import StampOffset, VisionMeasurement
 from tests.pipeline.flight import Flight, new, shifted
 from tests.pipeline.scoring import assert_same
 
@@ -149,3 +151,22 @@ def test_what_biases_seemed_to_do_at_a_wrong_time_offset_is_forgotten(world, arr
     monkeypatch.setattr(estimator._offset, "must_begin_again", lambda *_: True)
     flight.to(2.3)
     assert not estimator._bias_steps.walks.any()
+
+
+@pytest.mark.parametrize(("off_s", "begins"), [(0.0, 1), (0.01, 1), (-0.01, 1), (0.12, 2)])
+def test_a_filter_unsure_of_time_takes_the_offset_that_another_found_and_goes_on(off_s, begins):
+    """Unless it is farther off than the filter may be: then it begins again."""
+    world = World(WorldOptions(seed=11, duration=2.0, time_offset=off_s))
+    flight, told = Flight(world, events(world)), StampOffset(off_s, 2e-4)
+
+    def tell(sample):
+        is_picture = isinstance(sample, VisionMeasurement)
+        return replace(sample, offset=told) if is_picture and flight.outcomes else sample
+
+    flight.to(0.4, tell)
+    health = flight.filter.health
+    assert health.time_offset == pytest.approx(off_s, abs=1e-3)
+    assert health.time_offset_sigma < 3e-4
+    assert flight.filter.pictures[Fusion.STARTED] == begins
+    state = flight.to(2.0, tell)
+    assert flight.error(state) < 0.005 + 5.0 * state.sigma_p
