@@ -47,14 +47,12 @@ from pipeline.signals import (
     VisionMeasurement,
 )
 from pipeline.so3_kernels import largest_sigma
-from pipeline.timing.offset_watch import UNSURE, OffsetMonitor
+from pipeline.timing.offset_watch import OffsetMonitor
 
 DATED_S: Final = 0.005
 """While the pictures' time is known worse [s], a miss tells of it, not of the motion samples."""
 ONE_DATE_S: Final = 0.002
 """While it is known worse [s], a miss along the motion tells of it, not of one picture's date."""
-SURER: Final = 3.0
-"""Times as sure as the filter, and a coarse time offset is taken: else it only watches."""
 FRESH_S: Final = 2.0
 """A restart so soon after the last one: what was kept of the sensors is wrong as well."""
 NIS_PICTURES: Final = 30
@@ -239,24 +237,18 @@ class RelativeFilter:
         newest = self._track.newest
         if self._track.tone is not None:
             self._aliased.judge(newest.t, *self._track.amplitudes)
-        sigma = self._dated(float(np.sqrt(newest.P[OFFSET, OFFSET])))
-        if self._offset.must_begin_again(float(newest.x[X_OFFSET]), sigma, seen.t):
+        surer = self._offset.surer(*_learnt_offset(newest))
+        # a base that knows it better has pictures after it whose dates are doubted
+        if surer is not None and self._offset.surer(*_learnt_offset(self._track.base)) is not None:
+            self._track.date(surer)
+        value, sigma = _learnt_offset(newest)
+        if self._offset.must_begin_again(value, sigma, seen.t):
             self._t_start = seen.t  # nothing learnt at a wrong time is worth keeping
             self._bias_steps, self._adaptive_noise = BiasSteps(self._initial), AdaptiveNoise()
             self._track.walk(self._bias_steps.walks)
             self._track.doubt_phone(1.0)
             return self._start(seen, now)
         return Fusion.FUSED if used else Fusion.GATED
-
-    def _dated(self, sigma: float) -> float:
-        """Take the coarse time offset, if it is much surer and may be; gives the new deviation."""
-        coarse, track = self._offset.coarse, self._track
-        if coarse is None or sigma < SURER * coarse.sigma:
-            return sigma
-        if abs(coarse.value - float(track.newest.x[X_OFFSET])) > UNSURE * sigma:
-            return sigma
-        track.date(coarse)
-        return float(np.sqrt(track.newest.P[OFFSET, OFFSET]))
 
     def _start(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Begin at a pose, the body at rest in f; what was learnt of the sensors stays."""
@@ -345,9 +337,7 @@ class RelativeFilter:
         """Of the pictures' stamps, as learnt; None while it is not known, or not believed."""
         if not self._started or self.complaint:
             return None
-        newest = self._track.newest
-        sigma = float(np.sqrt(newest.P[OFFSET, OFFSET]))
-        return StampOffset(float(newest.x[X_OFFSET]), sigma, self._t_start)
+        return StampOffset(*_learnt_offset(self._track.newest), self._t_start)
 
     @property
     def complaint(self) -> str:
@@ -406,3 +396,8 @@ def _missed(pose: RelativePose, predicted: Checkpoint[VisionMeasurement]) -> Arr
     """(6,) by how much a picture's own pose is off what was predicted: δp in c, θ in b."""
     turn = log(predicted.R.T @ pose.R_cb)
     return np.concatenate((pose.p_bc_in_c - predicted.x[0:3], turn))
+
+
+def _learnt_offset(here: Checkpoint[VisionMeasurement]) -> tuple[float, float]:
+    """The pictures' time offset there, and its standard deviation [s]."""
+    return float(here.x[X_OFFSET]), float(np.sqrt(here.P[OFFSET, OFFSET]))

@@ -21,8 +21,10 @@ PATH_S: Final = 0.5
 """Places are remembered for so long: a picture may come late."""
 NEAR_M: Final = 0.008
 """A light farther from any place is none of the robot's."""
+LEAST: Final = 50
+"""Lights, before anything is said, ..."""
 LEAST_S: Final = 1.0
-"""Of lights, before anything is said."""
+"""... over so long."""
 ALIKE_S: Final = 0.3
 """Lights within it err alike, by the eye's own error."""
 
@@ -65,7 +67,7 @@ class LagTracker:
 
     def error(self) -> DisplayLag | None:
         """What is believed of the lag, less what it is; None while nobody can say."""
-        if not self._seen or self._seen[-1][0] - self._seen[0][0] < LEAST_S:
+        if len(self._seen) < LEAST or self._seen[-1][0] - self._seen[0][0] < LEAST_S:
             return None
         t, leds, besides, velocities = zip(*self._seen, strict=True)
         led, r, v = np.array(leds), np.array(besides), np.array(velocities)

@@ -24,6 +24,8 @@ SURE: Final = 4.0
 """Standard deviations of the coarse one that count as well."""
 UNSURE: Final = 3.0
 """Standard deviations of the learnt one, where there is none to compare it with."""
+SURER: Final = 3.0
+"""Times as sure as the learnt one, and the coarse one is worth taking."""
 PATIENCE_S: Final = 3.0
 """Strayed again so soon after it was set right: the stamps themselves drift."""
 UNKNOWN = "The pictures' time stamps are off: move the phone a little, so that by how much is seen."
@@ -40,6 +42,16 @@ class OffsetMonitor:
         """Why the filter's offset can't be believed; empty if it can."""
         self._t_set_right = self._t_agreed = -inf
         """When the filter was last set right, and when the coarse one last bore it out [s]."""
+
+    def surer(self, value: float, sigma: float) -> StampOffset | None:
+        """The coarse one, if a filter that has learnt `value` ± `sigma` [s] had better take it.
+
+        One that may be so far off, and that rests on pictures since they last agreed.
+        """
+        coarse = self.coarse
+        if coarse is None or coarse.since <= self._t_agreed or sigma < SURER * coarse.sigma:
+            return None
+        return coarse if abs(coarse.value - value) <= UNSURE * sigma else None
 
     def must_begin_again(self, value: float, sigma: float, t: float) -> bool:
         """Whether what is learnt, `value` ± `sigma` [s] at time `t`, is wrong: start by the coarse.

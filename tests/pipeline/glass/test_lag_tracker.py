@@ -76,6 +76,13 @@ def test_lights_that_stand_tell_nothing() -> None:
 
 def test_too_few_tell_nothing() -> None:
     assert filmed(0.02, seconds=0.9 * LEAST_S).error() is None
+    seldom = LagTracker()
+    for k in range(180):
+        t = k / 60.0
+        seldom.add_drawn(t + 0.05, places(t + 0.05))
+        if k % 30 == 29:
+            seldom.add_seen(t, places(t + 0.02))
+    assert seldom.error() is None
 
 
 def test_lights_that_are_not_the_robots_count_for_nothing() -> None:

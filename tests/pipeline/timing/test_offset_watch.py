@@ -5,7 +5,14 @@ from __future__ import annotations
 import pytest
 
 from pipeline.signals import StampOffset
-from pipeline.timing.offset_watch import DRIFTING, STRAY_S, UNKNOWN, UNSURE, OffsetMonitor
+from pipeline.timing.offset_watch import (
+    DRIFTING,
+    STRAY_S,
+    SURER,
+    UNKNOWN,
+    UNSURE,
+    OffsetMonitor,
+)
 
 
 @pytest.mark.parametrize(
@@ -63,3 +70,31 @@ def test_one_that_knows_nothing_yet_has_agreed_with_nobody() -> None:
     watch.coarse = StampOffset(0.005, 0.002)
     assert not watch.must_begin_again(0.0, 0.02, 1.0)
     assert watch.must_begin_again(0.02, 1e-3, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "is_taken"),
+    [
+        (0.01, 0.02, True),
+        (0.01 + 0.99 * UNSURE * 0.02, 0.02, True),
+        (0.01 + 1.01 * UNSURE * 0.02, 0.02, False),  # that far off it is not: begin again
+        (0.01, 0.99 * SURER * 0.001, False),
+        (0.01, 1.01 * SURER * 0.001, True),
+    ],
+)
+def test_a_coarse_one_is_taken_by_who_is_much_less_sure_and_may_be_as_far_off(
+    value: float, sigma: float, is_taken: bool
+) -> None:
+    watch = OffsetMonitor()
+    assert watch.surer(value, sigma) is None
+    watch.coarse = StampOffset(0.01, 0.001)
+    assert (watch.surer(value, sigma) is watch.coarse) is is_taken
+
+
+def test_a_coarse_one_by_older_pictures_is_not_taken_after_they_agreed() -> None:
+    watch = OffsetMonitor()
+    watch.coarse = StampOffset(0.01, 0.001, since=1.0)
+    assert not watch.must_begin_again(0.01, 1e-3, 2.0)
+    assert watch.surer(0.01, 0.02) is None  # its dates are doubted by something
+    watch.coarse = StampOffset(0.01, 0.001, since=2.1)
+    assert watch.surer(0.01, 0.02) is watch.coarse
