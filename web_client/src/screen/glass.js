@@ -21,6 +21,8 @@ export const OLD_MS = 150;
 /** A light is no smaller on the glass [px]. */
 export const LEAST_DOT_PX = 10;
 const ANSWERS = 50;
+/** With frames that stay longer, lights lag by up to twice as much as on average, and nobody leads well by them. */
+const SLOW_MS = 36;
 
 /**
  * Squares [x, y, side] of the light cells, in pixels from top left.
@@ -149,4 +151,13 @@ export function mmPerPixel(stored, density) {
  */
 export function sizeKey({ width, height }, density) {
   return `lightleash-mm ${width}x${height}@${density}`;
+}
+
+/**
+ * What is to be said of frames that come so slowly, as of a television at 24 Hz, or "".
+ * @param {number} periodMs
+ */
+export function slowness(periodMs) {
+  if (!(periodMs > SLOW_MS)) return '';
+  return `This screen shows only ${Math.round(1000 / periodMs)} pictures a second: set it to 60 Hz.`;
 }

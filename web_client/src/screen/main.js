@@ -11,6 +11,7 @@ import { VERSION } from '../wire/protocol.js';
 import { speak, write } from '../words/say.js';
 import {
   CARD_HIGH_MM, CARD_MM, FramePeriod, LEAST_DOT_PX, OLD_MS, ServerClock, lightCells, lightsAt, mmPerPixel, sizeKey,
+  slowness,
 } from './glass.js';
 
 const ASK_MS = 200;
@@ -70,7 +71,8 @@ function take(message) {
   if (message.type === 'clock_answer') clock.heard(message.page_ms, message.server_ms, now);
   if (message.type === 'lights') {
     newest = { lights: message, atMs: now };
-    say(message.why || (message.phase === 'sweep' ? 'Hold the phone still: measuring how late this screen is.' : ''));
+    const measures = message.phase === 'sweep' ? 'Hold the phone still: measuring how late this screen is.' : '';
+    say(message.why || slowness(period.ms) || measures);
   }
   if (message.type !== 'refused') return;
   say(`This screen is not taken: ${message.allowed}.`);

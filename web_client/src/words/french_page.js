@@ -315,6 +315,7 @@ export const PAGE = {
   "Start, full screen": "Plein écran",
   "The server is away: waiting for it.": "Le serveur est absent : en attente.",
   "Hold the phone still: measuring how late this screen is.": "Ne bougez plus le téléphone : mesure du retard d’écran.",
+  "This screen shows only {} pictures a second: set it to 60 Hz.": "Cet écran ne montre que {} images par seconde : réglez-le sur 60 Hz.",
   "This screen is not taken: {}.": "Cet écran est refusé : {}.",
   "Waiting to be let in: {}.": "En attente d’admission : {}.",
   "This browser is not let in yet: open a link of “lightleash invite --role viewer” in it first.": "Ce navigateur n’est pas encore admis : ouvrez-y d’abord un lien de « lightleash invite --role viewer »."

@@ -3,6 +3,7 @@ import { test } from 'node:test';
 
 import {
   CARD_MM, CELLS, FramePeriod, ServerClock, TILE_SHARE, lightCells, lightsAt, mmPerPixel, sizeKey,
+  slowness,
 } from '../../src/screen/glass.js';
 
 /** @param {Partial<import('../../src/wire/protocol_types.js').ScreenLights>} [other] */
@@ -60,6 +61,11 @@ test('a frame that was late does not change how long a frame lasts', () => {
   assert.ok(Math.abs(period.ms - 16.67) < 0.01);
   for (const at of [0, 8, 16, 24, 90, 98, 106]) period.tick(at);
   assert.equal(period.ms, 8);
+});
+
+test('a television at 24 Hz is told of, and none at 30 Hz or that is not known yet', () => {
+  assert.equal(slowness(1000 / 24), 'This screen shows only 24 pictures a second: set it to 60 Hz.');
+  for (const ms of [1000 / 30, 1000 / 60, NaN]) assert.equal(slowness(ms), '');
 });
 
 test('a screen’s size is remembered by its kind, and nonsense is not believed', () => {
