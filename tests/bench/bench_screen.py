@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from hardware.robot_file import COMMANDS, load_robot
+from hardware.sim.hand import make_hand
 from pipeline.config import PERIOD_S, TeleopConfig
 from server.common.options import Parser
 from server.common.ranges import number, seed_number
@@ -29,7 +30,7 @@ from server.simulation.screen import Display, ScreenSimulation
 from server.simulation.virtual_time import SimulationOptions
 from tests.e2e.conftest import wanted_chromium
 from tests.e2e.drawn_glass import GLASS, LAG_S, TILT_RAD
-from tests.e2e.screen_rig import PICTURES_HZ, lead
+from tests.e2e.screen_rig import PICTURES_HZ, REST_S, lead
 
 HANDS: Final = {"screen": "moving", "so101": "filming"}
 BEFORE_S: Final = 12.0
@@ -67,7 +68,9 @@ def in_virtual_time(robot: str, hand: str, seed: int, seconds: float) -> float:
     camera = TeleopConfig().virtual_camera
     config = teleop_config(robot_file, "phone", camera, "relative")
     scene = SimulationOptions(hand=hand, seed=seed, frame_rate_hz=PICTURES_HZ)
-    simulation = ScreenSimulation(robot_file, config, scene, Display(GLASS, LAG_S, TILT_RAD))
+    held = make_hand(hand, seed=seed, start=robot_file.start, rest_s=REST_S)
+    display = Display(GLASS, LAG_S, TILT_RAD)
+    simulation = ScreenSimulation(robot_file, config, scene, display, hand=held)
     trace = simulation.trace
     while simulation.t < BEFORE_S + seconds and len(trace.t) * PERIOD_S < seconds:
         simulation.advance()
