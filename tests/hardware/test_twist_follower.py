@@ -18,6 +18,7 @@ from hardware.link.datagram import (
 from hardware.link.link_key import mac
 from hardware.link.registry import connect, link_kind
 from hardware.link.robot_end import SILENCE_US, LinkLimits, RobotEnd
+from hardware.plant_parameters import NO_SENSORS
 from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
 from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.plant.twist_plant import TwistPlant
@@ -204,6 +205,22 @@ def test_the_simulated_body_moves_as_its_sensors_feel():
         v_in_f = v_in_f + 0.001 * (plant.R_fb @ a_in_b - np.array([0.0, 0.0, GRAVITY]))
         assert omega_in_b == pytest.approx(plant.twist_in_b[3:])
     assert v_in_f == pytest.approx(plant.R_fb @ plant.twist_in_b[:3], abs=0.003)
+
+
+def test_what_it_says_of_the_time_ahead_comes_true_and_moves_nothing():
+    plant = TwistPlant(DRIVE, NO_SENSORS, np.random.default_rng(0))
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        told = rng.normal(0.0, 0.3, 6)
+        plant.step(told)
+        before = plant.p_bf_in_f
+        ahead = plant.ahead(0.06)
+        np.testing.assert_array_equal(plant.p_bf_in_f, before)
+        assert [round(t, 6) for t, _, _ in ahead] == [0.005 * k for k in range(1, 13)]
+        for _, wxyz, p in ahead:
+            plant.step(told)
+            assert plant.p_bf_in_f == pytest.approx(p, abs=5e-4)
+            assert plant.wxyz_fb == pytest.approx(wxyz, abs=2e-3)
 
 
 def test_a_robot_that_has_thrusters_drops_the_samples_of_one_that_has_none():

@@ -21,9 +21,9 @@ from hardware.arm.inverse_kinematics import InverseKinematics
 from hardware.arm.joint_setpoints import JointSetpoints
 from hardware.arm.tip_odometry import TipOdometry
 from hardware.plant_parameters import ArmParameters, BodyImuParameters
-from hardware.sim.plant.coasting import coasting
 from hardware.sim.plant.delayed_twist import DelayedTwist
 from hardware.sim.plant.model import STEP_MS
+from hardware.sim.plant.moving_on import moving_on
 from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.robot import TwistDrive
@@ -107,11 +107,14 @@ class ArmPlant:
         return _in_steps(self.angles)
 
     def ahead(self, seconds: float, every: float = 0.005) -> list[tuple[float, Array, Array]]:
-        """Where it goes within `seconds` at its present twist; the robot itself doesn't move.
+        """Where it goes within `seconds`, told nothing more; the robot itself doesn't move.
 
-        Rows (in how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
+        Its servos are told ahead of their lag: its twist changes as what it is to do does. Rows (in
+        how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
         """
-        return coasting(self.R_fb, self.p_bf_in_f, self.twist_in_b, seconds, every)
+        future = self._told.ahead(round(seconds / every), round(1e3 * every))
+        twists = [self.twist_in_b + allowed - self._told.allowed for allowed in future]
+        return moving_on(self.R_fb, self.p_bf_in_f, twists, every)
 
     @property
     def p_bf_in_f(self) -> Array:

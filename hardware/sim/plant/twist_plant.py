@@ -15,9 +15,9 @@ from math import sqrt
 import numpy as np
 
 from hardware.plant_parameters import BodyImuParameters
-from hardware.sim.plant.coasting import coasting
 from hardware.sim.plant.delayed_twist import DelayedTwist
 from hardware.sim.plant.model import STEP_MS
+from hardware.sim.plant.moving_on import moving_on
 from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
 from pipeline.frames import GRAVITY, Array, cross, exp, wxyz_from_R
 from pipeline.robot import TwistDrive
@@ -84,11 +84,19 @@ class TwistPlant:
         self.R_fb = self.R_fb @ exp(h * mean[3:])
 
     def ahead(self, seconds: float, every: float = 0.005) -> list[tuple[float, Array, Array]]:
-        """Where it goes within `seconds` at its present twist; the robot itself doesn't move.
+        """Where it goes within `seconds`, told nothing more; the robot itself doesn't move.
 
         Rows (in how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
         """
-        return coasting(self.R_fb, self.p_bf_in_f, self.twist_in_b, seconds, every)
+        halfway, wheels, turned = self._halfway, self.wheels_in_b, list[Array]()
+        for allowed in self._told.ahead(round(1e3 * seconds / STEP_MS), STEP_MS):
+            halfway = halfway + self._share * (allowed - halfway)
+            before, wheels = wheels, wheels + self._share * (halfway - wheels)
+            turned.append(0.5 * (before + wheels))
+        steps = round(1e3 * every / STEP_MS)
+        means = np.reshape(turned, (-1, steps, 6)).mean(axis=1)
+        twists = (1.0 - self._slip) * means
+        return moving_on(self.R_fb, self.p_bf_in_f, twists, every)
 
     @property
     def wxyz_fb(self) -> Array:

@@ -113,6 +113,18 @@ def test_where_it_goes_is_where_it_then_is():
     assert ahead[-1][0] == pytest.approx(0.05)
 
 
+def test_where_it_goes_is_what_it_was_told_last_not_how_it_moves_yet():
+    arm = plant()
+    for _ in range(100):
+        arm.step(along(0, 0.1))
+    arm.step(along(2, 0.1))
+    ahead, begun = arm.ahead(0.06), arm.p_bf_in_f
+    for _t, _, p in ahead:
+        arm.step(along(2, 0.1))
+        assert arm.p_bf_in_f == pytest.approx(p, abs=0.001)
+    assert np.linalg.norm(arm.p_bf_in_f - begun - 0.06 * along(0, 0.1)[:3]) > 0.004
+
+
 def test_a_joint_without_a_servo_is_named(tmp_path):
     text = PARAMETERS.model.read_text()
     lacking = '<position name="elbow_flex" joint="elbow_flex"/>'
