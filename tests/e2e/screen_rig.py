@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from hardware.camera_file import find_camera
-from hardware.codec import Encoder
 from hardware.robot_file import COMMANDS, load_robot
-from hardware.sim.hand import make_hand
-from hardware.sim.phone import PhoneOptions, VirtualPhone
-from hardware.sim.render import RenderOptions
 from server.common import clock
 from server.common.access import Access
+from server.virtual_phone.command import make_parser, make_script
 from server.virtual_phone.live_phone import LivePhone
-from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
 from tests.e2e.chromium_phone import browser
 from tests.e2e.drawn_glass import SIZE, DrawnGlass
 from tests.e2e.serving import serving
 
-WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
 PICTURES_HZ: Final = 15.0
 """A picture of the glass takes 40 ms to draw, beside all that is measured."""
 REST_S: Final = 8.0
@@ -59,16 +53,11 @@ def lead(
         serving(folder, "--robot", robot) as server,
         browser(chromium, viewport=viewport) as context,
     ):
-        held = make_hand(
-            hand, seed=seed, start=robot_file.start, t_start=clock.now(), rest_s=REST_S
-        )
-        glass = DrawnGlass(context, server, held, leds_in_b.mean(axis=0))
-        camera, rng = find_camera(DEVICE, WIDTH, HEIGHT), np.random.default_rng((seed, 3))
-        options = PhoneOptions(frame_rate_hz=PICTURES_HZ)
-        phone = VirtualPhone(camera, held, leds_in_b, RenderOptions(), rng, options)
-        phone.films = glass.film
-        encoder = Encoder(WIDTH, HEIGHT, PICTURES_HZ, BITRATE_BPS, "h264")
-        script = PhoneScript(phone, encoder, VirtualOperator())
+        options = {"hand": hand, "seed": seed, "rest": REST_S, "fps": PICTURES_HZ}
+        told = make_parser().parse_args([f"--{name}={value}" for name, value in options.items()])
+        script = make_script(told, robot_file, server.truth_port)
+        glass = DrawnGlass(context, server, script.phone.hand, leds_in_b.mean(axis=0))
+        script.phone.films = glass.film
         access = Access(server.http_url, server.operator_token, server.truth_port, robot)
         said: list[str] = []
         frames_hz: list[float] = []
@@ -86,15 +75,13 @@ def lead(
             await live.run(BEFORE_S + seconds, report)
             return live
 
-        flown: list[LivePhone] = []
-        thread = threading.Thread(target=lambda: flown.append(asyncio.run(fly())), name="phone")
         began = clock.now()
-        thread.start()
-        while thread.is_alive():
-            glass.page.wait_for_timeout(200.0)
-        took_s = clock.now() - began
+        with ThreadPoolExecutor(1, "phone") as pool:
+            flown = pool.submit(asyncio.run, fly())
+            while not flown.done():
+                glass.page.wait_for_timeout(200.0)
+        took_s, live = clock.now() - began, flown.result()
         glass.close()
-        (live,) = flown
         return ScreenFlown(
             tracked_s=live.score.tracked_s,
             rms_mm=1e3 * live.score.rms_m,
