@@ -53,6 +53,10 @@ def test_a_lag_believed_20_ms_too_short_costs_no_more_than_its_first_seconds(see
     """What lights that come late seem to say of the pictures' dates is not believed."""
     simulation = flight(Display(lag_s=0.06, believed_lag_s=0.048), seed)
     figures = result_of(simulation.run(9.0), simulation.scene, 0.0)
+    offset = simulation.robot_of_light.time_offset
+    assert abs(offset.value) < 1e-3
+    told = simulation._frame_pipeline.front_end._stamps.offset  # by the glass
+    assert told.value == pytest.approx(offset.value, abs=1e-4)
     assert figures.tracked_s > 4.5
     assert not figures.ended
     assert figures.rms_mm < 6.0
