@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import nan, sqrt
 from typing import Final
 
@@ -15,6 +16,8 @@ from server.diagnostics.phone_check.figures import GlassFigures, PhoneFigures, Q
 from server.diagnostics.phone_check.phone_watch import PhoneFacts, PhoneSeries, PixelLook
 
 POSE_UNKNOWNS: Final = 6
+OFTEN: Final = 0.15
+"""Share of the pictures in which so many LEDs must be seen to count."""
 ENDS_S: Final = 30.0
 """Beginning and end, of which the rates of pictures are compared ..."""
 LONG_S: Final = 120.0
@@ -92,11 +95,16 @@ def _glass(facts: PhoneFacts, seen: GlassSeen, ages_ms: Quantiles) -> GlassFigur
 def _noise(looks: tuple[PixelLook, ...]) -> tuple[float, tuple[float, ...], float]:
     """Of an LED's centre per coordinate [px], of each LED, and the share that is the codec's [%].
 
-    A pose takes up six of the LEDs' errors: what is left is that much less.
+    A pose takes up six of the LEDs' errors: what is left is that much less. Where an LED was left
+    out because it did not fit, the others tell too little: pictures with the most LEDs count.
     """
     told = [look for look in looks if 2 * len(look.led) > POSE_UNKNOWNS]
     if not told:
         return nan, (), nan
+    often = Counter(len(look.led) for look in told)
+    enough = (n for n, count in often.items() if count >= OFTEN * len(told))
+    most = max(enough, default=max(often))
+    told = [look for look in told if len(look.led) == most]
     variances: list[float] = []
     by_led: dict[int, list[float]] = {}
     for look in told:

@@ -96,6 +96,20 @@ def test_noise_counts_what_a_pose_takes_up_and_names_the_worst_led() -> None:
     assert found.codec_pct == pytest.approx(100.0 * (1.0 - 0.01 / 0.08))
 
 
+@pytest.mark.parametrize(("every", "counts"), [(2, True), (4, True), (20, False)])
+def test_of_pictures_from_which_an_led_was_left_out_the_noise_is_not_told(
+    every: int, counts: bool
+) -> None:
+    """They were chosen for how well they fit; those with all LEDs tell, if there are enough."""
+    phone = Filming()
+    whole = replace(FOUND, off_px=(0.2,) * 5)
+    fits = PixelLook(0.0, True, (0, 1, 2, 3), (0.05,) * 4, 0.1)
+    for k in range(100):
+        phone.film(0.1, look=fits if k % every else whole)
+    noise_px = np.sqrt(5 * 0.04 / 4) if counts else np.sqrt(4 * 0.0025 / 2)
+    assert phone.told(60.0).noise_px == pytest.approx(noise_px)
+
+
 def test_three_leds_leave_no_error_to_be_seen() -> None:
     phone = Filming()
     phone.film(10.0, look=PixelLook(0.0, True, (0, 1, 2), (0.0,) * 3, 0.1))
