@@ -7,9 +7,10 @@ from functools import cache
 import cv2
 import numpy as np
 
+from hardware.sim.hand import Hand
 from hardware.sim.render import RelativePoseAt, RenderOptions, render
 from pipeline.camera.lens import Camera
-from pipeline.frames import Array
+from pipeline.frames import Array, R_from_rpy
 from pipeline.glass.window import CELLS, MARKER_IDS, Glass, on_glass
 from pipeline.signals import Image
 
@@ -19,6 +20,20 @@ FINER = 4
 """A tile is put into the picture at so many times its size, then made smaller: smooth edges."""
 DOT_M = 0.0015
 """Radius of a dot."""
+
+
+def glass_before(hand: Hand, t: float, middle_in_f: Array, tilt_rad: float) -> RelativePoseAt:
+    """Where a glass on a table is before the camera in a `hand` around `t` [s].
+
+    Its middle is at `middle_in_f` (3,) [m]; its upper edge leans away by `tilt_rad`.
+    """
+    R_fg = R_from_rpy(np.array([0.0, -tilt_rad, 0.0]))
+
+    def glass_at(dt: float) -> tuple[Array, Array]:
+        R_fc, p_cf_in_f = hand.pose(t + dt)
+        return R_fc.T @ R_fg, R_fc.T @ (middle_in_f - p_cf_in_f)
+
+    return glass_at
 
 
 def film(

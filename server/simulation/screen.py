@@ -9,12 +9,12 @@ from math import radians
 import numpy as np
 
 from hardware.robot_file import RobotFile
-from hardware.sim.glass_film import film
+from hardware.sim.glass_film import film, glass_before
 from hardware.sim.hand import Hand
 from hardware.sim.phone import BodyHistory
 from pipeline.camera.lens import Camera
 from pipeline.config import TeleopConfig
-from pipeline.frames import Array, R_from_rpy
+from pipeline.frames import Array
 from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, swept
 from pipeline.glass.robot_of_light import STEP_S, Lights, RobotOfLight
 from pipeline.glass.window import Glass
@@ -148,15 +148,11 @@ class ScreenSimulation(VirtualTimeSimulation):
 
     def _film(self, camera: Camera, t: float, _: BodyHistory, rng: np.random.Generator) -> Image:
         """A picture of the glass taken at `t` [s]."""
-        R_fg = R_from_rpy(np.array([0.0, -self._display.tilt_rad, 0.0]))
-
-        def glass_at(dt: float) -> tuple[Array, Array]:
-            R_fc, p_cf_in_f = self.phone.hand.pose(t + dt)
-            return R_fc.T @ R_fg, R_fc.T @ (self._rest_in_f - p_cf_in_f)
-
         glass, dots = self._display.glass, np.zeros((0, 2))
         lit = [frame for frame in self._shown if frame[0] <= t]
         if lit:
             since, dots = lit[-1]
             self.drawn_before_s.append(t - since + self._display.lag_s)
-        return film(camera, glass_at, glass, dots[glass.has(dots)], rng, self._display.grey)
+        display = self._display
+        glass_at = glass_before(self.phone.hand, t, self._rest_in_f, display.tilt_rad)
+        return film(camera, glass_at, glass, dots[glass.has(dots)], rng, display.grey)

@@ -14,11 +14,11 @@ from playwright.sync_api import BrowserContext, Page
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from hardware.sim.glass_film import film
+from hardware.sim.glass_film import film, glass_before
 from hardware.sim.hand import Hand
 from hardware.sim.phone import BodyHistory
 from pipeline.camera.lens import Camera
-from pipeline.frames import Array, R_from_rpy
+from pipeline.frames import Array
 from pipeline.glass.window import Glass
 from pipeline.signals import Image
 from server.common import clock
@@ -82,14 +82,9 @@ class DrawnGlass:
 
     def film(self, camera: Camera, t: float, _: BodyHistory, rng: np.random.Generator) -> Image:
         """A picture of it taken at `t` [s]; see `VirtualPhone.films`."""
-        R_fg = R_from_rpy(np.array([0.0, -TILT_RAD, 0.0]))
-
-        def glass_at(dt: float) -> tuple[Array, Array]:
-            R_fc, p_cf_in_f = self._hand.pose(t + dt)
-            return R_fc.T @ R_fg, R_fc.T @ (self._rest_in_f - p_cf_in_f)
-
         lit = [dots for drawn, dots in tuple(self._frames) if drawn + LAG_S <= t]
         dots = lit[-1] if lit else np.zeros((0, 2))
+        glass_at = glass_before(self._hand, t, self._rest_in_f, TILT_RAD)
         return film(camera, glass_at, GLASS, dots[GLASS.has(dots)], rng)
 
     def frames_hz(self) -> float:
