@@ -223,6 +223,16 @@ def test_what_it_says_of_the_time_ahead_comes_true_and_moves_nothing():
             assert plant.wxyz_fb == pytest.approx(wxyz, abs=2e-3)
 
 
+def test_who_stands_before_a_wall_goes_nowhere_whatever_it_is_told():
+    plant = TwistPlant(DRIVE, NO_SENSORS, np.random.default_rng(0))
+    plant.is_blocked = plant.wheels_spin = True
+    for _ in range(20):
+        plant.step(np.full(6, 0.1))
+    for _, wxyz, p in plant.ahead(0.06):
+        np.testing.assert_array_equal(p, plant.p_bf_in_f)
+        np.testing.assert_array_equal(wxyz, plant.wxyz_fb)
+
+
 def test_a_robot_that_has_thrusters_drops_the_samples_of_one_that_has_none():
     follower = VirtualTimeFollower(TWISTER)
     ames = VirtualTimeFollower(load_robot("ames"))

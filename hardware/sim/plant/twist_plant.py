@@ -95,7 +95,7 @@ class TwistPlant:
             turned.append(0.5 * (before + wheels))
         steps = round(1e3 * every / STEP_MS)
         means = np.reshape(turned, (-1, steps, 6)).mean(axis=1)
-        twists = (1.0 - self._slip) * means
+        twists = (0.0 if self.is_blocked else 1.0 - self._slip) * means
         return moving_on(self.R_fb, self.p_bf_in_f, twists, every)
 
     @property
