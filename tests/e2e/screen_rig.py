@@ -13,6 +13,7 @@ import numpy as np
 from hardware.robot_file import COMMANDS, load_robot
 from server.common import clock
 from server.common.access import Access
+from server.protocol.messages import Status
 from server.virtual_phone.command import make_parser, make_script
 from server.virtual_phone.live_phone import LivePhone
 from tests.e2e.chromium_phone import browser
@@ -39,7 +40,7 @@ class ScreenFlown:
     pictures_hz: float
     """Of the phone."""
     said: tuple[str, ...]
-    """By the server, in turn: its mode, and why."""
+    """By the server, in turn: its mode, and why, or why it can't be armed yet."""
 
 
 def lead(
@@ -64,7 +65,7 @@ def lead(
 
         def report(live: LivePhone) -> None:
             frames_hz.append(glass.frames_hz())
-            words = f"{live.status.mode}: {live.status.reason}" if live.status else ""
+            words = _words(live.status)
             if words not in said[-1:]:
                 said.append(words)
             if live.score.tracked_s > seconds:
@@ -89,3 +90,10 @@ def lead(
             pictures_hz=live.sent / took_s,
             said=tuple(said),
         )
+
+
+def _words(status: Status | None) -> str:
+    if status is None:
+        return ""
+    why = status.refusals if status.mode == "DISARMED" else (status.reason,)
+    return f"{status.mode}: {' '.join(why)}"
