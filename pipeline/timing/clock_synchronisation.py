@@ -22,7 +22,12 @@ WINDOW_S: Final = 60.0
 BUCKET_S: Final = 1.0
 """Of each such span only its tightest bounds are kept."""
 NEEDED: Final = 5
-"""Answers before anything is dated."""
+"""Answers before anything is dated, none of which says much more than those before."""
+SURE_S: Final = 0.06
+"""Bound of the error until which nothing is dated: a page that hangs while it begins answers late
+and all at once, and what its first answers leave open would be slewed away for many seconds."""
+LATEST_S: Final = 3.0
+"""After the first answer the bound is taken as it is: the network is slow for good."""
 CONTRADICTIONS: Final = 3
 """So many in a row: the clock jumped. Meanwhile nothing is dated."""
 TOLERANCE_S: Final = 5e-4
@@ -40,6 +45,10 @@ class ClockSynchronisation:
         self._buckets: deque[TightestBounds] = deque()
         self._contradictions: list[tuple[float, float, float]] = []
         self._answers = 0
+        """Since one said much more than those before."""
+        self._widest = inf
+        """Bound of the error at that one [s]."""
+        self._is_sure = False
         self._trips: deque[tuple[float, float]] = deque()
         self._line: ClockLine | None = None
         self._mapping = ClockMapping()
@@ -69,7 +78,7 @@ class ClockSynchronisation:
     @property
     def ready(self) -> bool:
         """Enough answers to trust it, and the last one doesn't contradict them."""
-        return self._answers >= self._needed and not self._contradictions
+        return self._is_sure and not self._contradictions
 
     @property
     def offset(self) -> float:
@@ -127,7 +136,8 @@ class ClockSynchronisation:
         answers, self._contradictions = self._contradictions, []
         self._buckets.clear()
         self._trips.clear()
-        self._answers, self._line = 0, None
+        self._answers, self._widest, self._is_sure = 0, inf, False
+        self._line = None
         self._surest = (-inf, inf)
         self.restarts += 1
         self.reason = reason
@@ -141,13 +151,23 @@ class ClockSynchronisation:
         is_news = self._remember(lower, upper, drift)
         if t_asked >= self.earliest(t_remote):
             self._surest = (t_asked, t_remote)
-        self._answers += 1
         self._trips.append((t_answered, t_answered - t_asked))
         while self._trips[0][0] < t_answered - WINDOW_S:
             self._trips.popleft()
         if is_news:
             self._line = self._refit(t_answered)
-            self._mapping.steer(self._line, settled=self._answers > self._needed)
+            self._mapping.steer(self._line, settled=self._is_sure)
+        if not self._is_sure:
+            self._is_sure = self._is_settled(t_answered - self._trips[0][0])
+
+    def _is_settled(self, waited_s: float) -> bool:
+        """Whether the next answers will hardly change the offset; asked at each answer."""
+        error = self.error
+        if error < 0.75 * self._widest:
+            self._answers, self._widest = 0, error
+        self._answers += 1
+        is_narrow = error <= SURE_S or waited_s >= LATEST_S
+        return self._answers >= self._needed and is_narrow
 
     def _refit(self, t: float) -> ClockLine:
         """The line through what still agrees; a rate that has changed costs the older half."""
