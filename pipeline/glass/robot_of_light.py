@@ -40,6 +40,7 @@ FARTHEST_WIDTHS = 2.5
 CORRECTED_S = 0.003
 """By so much at most a picture corrects a lag: the lights jump by it times their speed."""
 LOOK = "Point the phone at the screen, all four corners in the picture."
+MEASURES = "Hold the phone still: measuring how late this screen is."
 LAGS = (
     "This screen shows everything {late_ms:.0f} ms late, which is too late to lead by: choose its "
     "game mode, or another one."
@@ -213,7 +214,7 @@ class RobotOfLight:
             is_late = late_s > OLD_S and eye is not None and eye.age < late_s + OLD_S
             return Lights("search", LATE.format(late_ms=1e3 * late_s) if is_late else LOOK)
         if self.lag is None:
-            return Lights("sweep", self._misplaced(eye))
+            return Lights("sweep", self._misplaced(eye) or MEASURES)
         if not self._is_fit(self.lag):
             # measured on: another mode of the display, or clocks that are known by then, mend it
             late_ms = 1e3 * self.lag.value

@@ -340,6 +340,8 @@ class PhoneSession:
         """Why there is no pose, though there are pictures."""
         if busy and (self.detection is None or now - self.detection.t > STALE_S):
             return [busy]
+        if self._screen is not None and self._screen.why:  # it does not show the robot yet
+            return [self._screen.why]
         found = self.detection.reason if self.detection is not None else ""
         return [f"The robot is not seen. {found}".strip()]
 

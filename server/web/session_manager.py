@@ -331,10 +331,7 @@ class SessionManager:
             return [self.unready]
         if self.phone is None:
             return ["No phone is connected: scan the code, or start the virtual phone."]
-        lacks = self.phone.refusals(now(), self.load.words)
-        if lacks and self.screen is not None and self.screen.why:
-            lacks.append(self.screen.why)
-        return lacks
+        return self.phone.refusals(now(), self.load.words)
 
     def _tick(self) -> None:
         self.to_control(ReadyInput(self.refusals()))

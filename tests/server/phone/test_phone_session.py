@@ -440,6 +440,18 @@ def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() ->
     rig.phone.close()
 
 
+def test_why_a_screen_shows_no_robot_yet_is_told_in_place_of_not_seeing_it() -> None:
+    rig = Rig(DEVICE)
+    rig.synchronise()
+    rig.settle()
+    rig.say(JPEG)
+    rig.phone._screen = screen = OpenableScreen()  # type: ignore[assignment]
+    assert rig.why() == ["The robot is not seen."]
+    screen.why = "Hold the phone still: measuring how late this screen is."
+    assert rig.why() == [screen.why]
+    rig.phone.close()
+
+
 def test_eyes_are_told_when_pictures_were_taken_by_the_glass_that_they_film() -> None:
     rig, screen = Rig(DEVICE), OpenableScreen()
     rig.phone._screen = screen  # type: ignore[assignment]

@@ -20,6 +20,7 @@ from pipeline.frames import GRAVITY, R_from_rpy
 from pipeline.glass.display_lag import BORNE_S, MOST_LAG_S, SWEEP_SHARE, DisplayLag, swept
 from pipeline.glass.fiducials import glass_seen
 from pipeline.glass.lens_meter import TILT, GlassCorners
+from pipeline.glass.robot_of_light import MEASURES
 from pipeline.glass.window import CELLS, MARKER_IDS, TILE_SHARE, Glass, on_glass
 from pipeline.signals import PhoneImu
 from server.protocol.screen_messages import ScreenSize
@@ -96,6 +97,7 @@ def test_a_phone_that_films_is_shown_a_sweep_and_then_the_robot(make):
     assert thread.step(0.0).phase == "search"
     assert "four corners" in thread.why
     assert filmed(thread, 1.0, 0.03, since=1.0).phase == "sweep"
+    assert thread.why == MEASURES
     lights = filmed(thread, 2.5, 0.03, since=2.0)
     assert lights.phase == "robot"
     assert lights.lag_ms == pytest.approx(30.0, abs=1.0)

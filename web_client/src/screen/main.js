@@ -71,8 +71,7 @@ function take(message) {
   if (message.type === 'clock_answer') clock.heard(message.page_ms, message.server_ms, now);
   if (message.type === 'lights') {
     newest = { lights: message, atMs: now };
-    const measures = message.phase === 'sweep' ? 'Hold the phone still: measuring how late this screen is.' : '';
-    say(message.why || slowness(period.ms) || measures);
+    say(message.why || slowness(period.ms));
   }
   if (message.type !== 'refused') return;
   say(`This screen is not taken: ${message.allowed}.`);

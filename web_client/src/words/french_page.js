@@ -314,7 +314,6 @@ export const PAGE = {
   "The screen stands still; you stand before it, an arm or two away.": "L’écran ne bouge pas ; vous êtes devant, à un bras ou deux.",
   "Start, full screen": "Plein écran",
   "The server is away: waiting for it.": "Le serveur est absent : en attente.",
-  "Hold the phone still: measuring how late this screen is.": "Ne bougez plus le téléphone : mesure du retard d’écran.",
   "This screen shows only {} pictures a second: set it to 60 Hz.": "Cet écran ne montre que {} images par seconde : réglez-le sur 60 Hz.",
   "This screen is not taken: {}.": "Cet écran est refusé : {}.",
   "Waiting to be let in: {}.": "En attente d’admission : {}.",

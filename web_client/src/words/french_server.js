@@ -365,6 +365,7 @@ export const SERVER = {
   "The phone is too far away: come nearer.": "Le téléphone est trop loin : approchez-vous.",
   "The phone is too near: go back a little.": "Le téléphone est trop près : reculez un peu.",
   "This robot does not fit the screen: choose a larger screen, or start with --robot screen.": "Ce robot ne tient pas dans l’écran : prenez un écran plus grand, ou démarrez avec --robot screen.",
+  "Hold the phone still: measuring how late this screen is.": "Ne bougez plus le téléphone : mesure du retard d’écran.",
   "This screen shows everything {} ms late, which is too late to lead by: choose its game mode, or another one.": "Cet écran montre tout avec {} ms de retard, trop pour guider : choisissez son mode jeu, ou un autre écran.",
   "It touches something: lead by all of the motion.": "Il touche quelque chose : guidez par tout le mouvement.",
   "Mend it, then press STOP and Reset.": "Réparez, puis STOP et réinitialisation.",
