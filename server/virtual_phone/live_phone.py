@@ -116,8 +116,8 @@ class LivePhone:
         Raises:
             PhoneClientError: the server is not there, refuses or goes away.
         """
+        self._garbage.settle()  # before anybody waits for an answer
         await self.client.open(DEVICE)
-        self._garbage.settle()
         parts = (
             self.client.run(),
             self._motions(),
