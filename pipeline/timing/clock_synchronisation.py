@@ -39,9 +39,8 @@ SLEW_S, MAX_SLEW = 0.5, 0.02
 class ClockSynchronisation:
     """Remote clock minus our clock."""
 
-    def __init__(self, needed: int = NEEDED) -> None:
-        """Be ready after `needed` answers, at a start as after a jump."""
-        self._needed = needed
+    def __init__(self) -> None:
+        """Nothing known."""
         self._buckets: deque[TightestBounds] = deque()
         self._contradictions: list[tuple[float, float, float]] = []
         self._answers = 0
@@ -167,7 +166,7 @@ class ClockSynchronisation:
             self._answers, self._widest = 0, error
         self._answers += 1
         is_narrow = error <= SURE_S or waited_s >= LATEST_S
-        return self._answers >= self._needed and is_narrow
+        return self._answers >= NEEDED and is_narrow
 
     def _refit(self, t: float) -> ClockLine:
         """The line through what still agrees; a rate that has changed costs the older half."""
