@@ -9,7 +9,6 @@ that what else the machine does meets both. The exit code is 1 if the goal is mi
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,11 +27,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from server.common.options import Parser
 from server.common.ranges import number
 from server.common.text import table
+from tests.bench.steady_phone import leading
 from tests.e2e.serving import Serving, serving
 
 TURN_S: Final = 15.0
 MOST_SHARE = 0.01
-PATIENCE_S = 60.0
 CPU: Final = "process_cpu_seconds_total "
 COLUMNS: Final = (
     ("what", "recording", "{}"),
@@ -93,23 +92,12 @@ def turn(server: Serving, written: Written, *, records: bool) -> tuple[float, Wr
 
 def flown(server: Serving, minutes: float) -> tuple[list[Turns], Written]:
     """Lead, and take turns meanwhile."""
-    command = [sys.executable, "-m", "server", "phone", "--hand", "steady", "--rest", "1"]
-    with subprocess.Popen(
-        command, env=server.environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as phone:
-        try:
-            end = time.monotonic() + PATIENCE_S
-            while (said := server.request("GET", "/api/status"))["mode"] != "TRACK":
-                if time.monotonic() > end:
-                    raise TimeoutError(str(said["refusals"]))
-                time.sleep(0.1)
-            written, shares = Written(), {False: list[float](), True: list[float]()}
-            for k in range(2 * max(1, round(60.0 * minutes / (2.0 * TURN_S)))):
-                records = k % 4 in (1, 2)
-                share, written = turn(server, written, records=records)
-                shares[records].append(share)
-        finally:
-            phone.terminate()
+    written, shares = Written(), {False: list[float](), True: list[float]()}
+    with leading(server):
+        for k in range(2 * max(1, round(60.0 * minutes / (2.0 * TURN_S)))):
+            records = k % 4 in (1, 2)
+            share, written = turn(server, written, records=records)
+            shares[records].append(share)
     names = {False: "no", True: "yes"}
     return [Turns(names[on], len(each), mean(each)) for on, each in shares.items()], written
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import os
 import socket
 import subprocess
@@ -31,11 +30,12 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from server.common.options import Parser
 from server.common.text import table
+from tests.bench.steady_phone import leading
 from tests.e2e.serving import Serving, serving
 
 HOST, SECRET = "127.0.0.1", "north"
 MOST_RATIO = 1.2
-PATIENCE_S, LEAVE_S = 60.0, 10.0
+LEAVE_S = 10.0
 COLUMNS: Final = (
     ("way", "way", "{}"),
     ("begins_s", "begins s", "{:.1f}"),
@@ -95,26 +95,12 @@ def led(server: Serving, seconds: float) -> tuple[float, float, float]:
     Raises:
         TimeoutError: it never followed; with the reasons.
     """
-    command = [sys.executable, "-m", "server", "phone", "--hand", "steady", "--rest", "1"]
-    began = time.monotonic()
-    with subprocess.Popen(
-        [*command, "--path", "webrtc"], env=server.environment, stdout=subprocess.PIPE
-    ) as phone:
-        try:
-            while (said := server.request("GET", "/api/status"))["mode"] != "TRACK":
-                if time.monotonic() > began + PATIENCE_S:
-                    raise TimeoutError(str(said["refusals"]))
-                time.sleep(0.1)
-            begins_s = time.monotonic() - began
-            time.sleep(seconds)
-            said = server.request("GET", "/api/status")
-        finally:
-            phone.terminate()
-            assert phone.stdout is not None
-            summary = json.loads(phone.stdout.read().decode().splitlines()[-1])
+    with leading(server, "--path", "webrtc") as phone:
+        time.sleep(seconds)
+        said = server.request("GET", "/api/status")
     latency = said["latency_ms"]
     assert isinstance(latency, dict)
-    return begins_s, summary["rms_mm"], latency["capture to arrival"]
+    return phone.begins_s, phone.summary["rms_mm"], latency["capture to arrival"]
 
 
 def flown(way: str, seconds: float) -> RelayFlight:
