@@ -12,7 +12,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -42,8 +42,10 @@ COLUMNS: Final[tuple[Column, ...]] = (
     ("rms_mm", "RMS mm", "{:.2f}"),
     ("virtual_mm", "virtual time mm", "{:.2f}"),
     ("ratio", "ratio", "{:.2f}"),
+    ("alike_mm", "with pictures as late and few mm", "{:.2f}"),
     ("frames_hz", "frames Hz", "{:.1f}"),
     ("pictures_hz", "pictures Hz", "{:.1f}"),
+    ("late_ms", "late ms", "{}"),
 )
 
 
@@ -58,16 +60,21 @@ class Row:
     virtual_mm: float
     """The same hand's, in virtual time."""
     ratio: float
+    alike_mm: float
+    """In virtual time with as many pictures a second, as late on their way, as in this flight."""
     frames_hz: float
     pictures_hz: float
+    late_ms: str
 
 
-def in_virtual_time(robot: str, hand: str, seed: int, seconds: float) -> float:
-    """RMS error [mm] since the press."""
+def in_virtual_time(
+    robot: str, hand: str, seed: int, seconds: float, pictures: SimulationOptions
+) -> float:
+    """RMS error [mm] since the press, by a phone whose `pictures` come so often and so late."""
     robot_file = load_robot(robot, takes=COMMANDS)
     camera = TeleopConfig().virtual_camera
     config = teleop_config(robot_file, "phone", camera, "relative")
-    scene = SimulationOptions(hand=hand, seed=seed, frame_rate_hz=PICTURES_HZ)
+    scene = replace(pictures, hand=hand, seed=seed)
     held = make_hand(hand, seed=seed, start=robot_file.start, rest_s=REST_S)
     display = Display(GLASS, LAG_S, TILT_RAD)
     simulation = ScreenSimulation(robot_file, config, scene, display, hand=held)
@@ -82,7 +89,9 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
     hand = HANDS[robot]
     with tempfile.TemporaryDirectory() as folder:
         flown = lead(chromium, Path(folder), robot, hand, seed, seconds)
-    virtual_mm = in_virtual_time(robot, hand, seed, seconds)
+    usual = SimulationOptions(frame_rate_hz=PICTURES_HZ)
+    alike = replace(usual, frame_rate_hz=flown.pictures_hz, latency_s=flown.late_s)
+    virtual_mm = in_virtual_time(robot, hand, seed, seconds, usual)
     return Row(
         robot=robot,
         hand=hand,
@@ -90,8 +99,10 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
         rms_mm=flown.rms_mm,
         virtual_mm=virtual_mm,
         ratio=flown.rms_mm / virtual_mm,
+        alike_mm=in_virtual_time(robot, hand, seed, seconds, alike),
         frames_hz=flown.frames_hz,
         pictures_hz=flown.pictures_hz,
+        late_ms="-".join(f"{1e3 * late_s:.0f}" for late_s in flown.late_s),
     )
 
 

@@ -39,6 +39,9 @@ class ScreenFlown:
     """Of the page."""
     pictures_hz: float
     """Of the phone."""
+    late_s: tuple[float, float]
+    """Of four in five pictures, from the capture to the arrival: the phone's own drawing is in it.
+    """
     said: tuple[str, ...]
     """By the server, in turn: its mode, and why, or why it can't be armed yet."""
 
@@ -62,9 +65,12 @@ def lead(
         access = Access(server.http_url, server.operator_token, server.truth_port, robot)
         said: list[str] = []
         frames_hz: list[float] = []
+        late_ms: list[float] = [np.nan]
 
         def report(live: LivePhone) -> None:
             frames_hz.append(glass.frames_hz())
+            if live.status is not None and live.status.mode == "TRACK":
+                late_ms.append(live.status.latency_ms["capture to arrival"])
             words = _words(live.status)
             if words not in said[-1:]:
                 said.append(words)
@@ -88,6 +94,7 @@ def lead(
             rms_mm=1e3 * live.score.rms_m,
             frames_hz=float(np.median(frames_hz)),
             pictures_hz=live.sent / took_s,
+            late_s=tuple(1e-3 * np.nanpercentile(late_ms, (10.0, 90.0))),
             said=tuple(said),
         )
 
