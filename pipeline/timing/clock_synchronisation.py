@@ -22,11 +22,13 @@ WINDOW_S: Final = 60.0
 BUCKET_S: Final = 1.0
 """Of each such span only its tightest bounds are kept."""
 NEEDED: Final = 5
-"""Answers before anything is dated, none of which says much more than those before."""
-SURE_S: Final = 0.06
+"""Answers before anything is dated, none of which says much more than those before: a quarter of
+the error that they leave, and more than is slewed away unseen."""
+UNSEEN_S: Final = 0.005
+SURE_S: Final = 0.1
 """Bound of the error until which nothing is dated: a page that hangs while it begins answers late
 and all at once, and what its first answers leave open would be slewed away for many seconds."""
-LATEST_S: Final = 3.0
+LATEST_S: Final = 1.0
 """After the first answer the bound is taken as it is: the network is slow for good."""
 CONTRADICTIONS: Final = 3
 """So many in a row: the clock jumped. Meanwhile nothing is dated."""
@@ -162,7 +164,7 @@ class ClockSynchronisation:
     def _is_settled(self, waited_s: float) -> bool:
         """Whether the next answers will hardly change the offset; asked at each answer."""
         error = self.error
-        if error < 0.75 * self._widest:
+        if error < min(0.75 * self._widest, self._widest - UNSEEN_S):
             self._answers, self._widest = 0, error
         self._answers += 1
         is_narrow = error <= SURE_S or waited_s >= LATEST_S
