@@ -20,12 +20,11 @@ from __future__ import annotations
 import fcntl
 import logging
 import os
-import queue
 import threading
+from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO, Literal, NamedTuple
 
 import msgspec
 from mcap.writer import Writer
@@ -85,8 +84,7 @@ class RecordingError(Exception):
         self.path, self.what, self.allowed = path, what, allowed
 
 
-@dataclass(frozen=True, slots=True)
-class _Item:
+class _Item(NamedTuple):
     topic: str
     t: float
     data: bytes | ControlStatus
@@ -118,7 +116,7 @@ class Recorder:
         """Why the recording ended early, or ""."""
         self._max_bytes, self._t_alive = max_bytes, clock.now()
         self._closing = threading.Event()
-        self._queue: queue.Queue[_Item | _Learnt] = queue.Queue(CAPACITY)
+        self._waiting: deque[_Item | _Learnt] = deque()
         self._folder = folder
         try:
             folder.path.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -177,13 +175,10 @@ class Recorder:
         self._thread.join()
 
     def _put(self, item: _Item | _Learnt) -> None:
-        if self.error or self._closing.is_set():
+        if self.error or self._closing.is_set() or len(self._waiting) >= CAPACITY:
             self.dropped += 1
             return
-        try:
-            self._queue.put_nowait(item)
-        except queue.Full:
-            self.dropped += 1
+        self._waiting.append(item)
 
     def _run(self) -> None:
         try:
@@ -201,11 +196,11 @@ class Recorder:
 
     def _write(self, writer: Writer, channels: dict[str, int]) -> None:
         flushed = clock.now()
-        while not (self._closing.is_set() and self._queue.empty()):
+        while not self._closing.is_set() or self._waiting:  # in this order: none is left behind
             # all that came meanwhile at once: to wake for each costs more than to write it
             self._closing.wait(GATHER_S)
-            for _ in range(self._queue.qsize()):
-                self._add(writer, channels, self._queue.get_nowait())
+            for _ in range(len(self._waiting)):
+                self._add(writer, channels, self._waiting.popleft())
             self._t_alive = clock.now()
             if self._t_alive - flushed >= FLUSH_S:
                 writer.flush()  # type: ignore[no-untyped-call]
