@@ -24,7 +24,7 @@ PICTURES_HZ: Final = 15.0
 """A picture of the glass takes 40 ms to draw, beside all that is measured."""
 REST_S: Final = 8.0
 """Until the hand moves: by then it is led."""
-BEFORE_S: Final = 12.0
+BEFORE_S: Final = 20.0
 """Until it is led, at most."""
 
 
@@ -94,7 +94,7 @@ def lead(
             rms_mm=1e3 * live.score.rms_m,
             frames_hz=float(np.median(frames_hz)),
             pictures_hz=live.sent / took_s,
-            late_s=tuple(1e-3 * np.nanpercentile(late_ms, (10.0, 90.0))),
+            late_s=_span(late_ms),
             said=tuple(said),
         )
 
@@ -104,3 +104,8 @@ def _words(status: Status | None) -> str:
         return ""
     why = status.refusals if status.mode == "DISARMED" else (status.reason,)
     return f"{status.mode}: {' '.join(why)}"
+
+
+def _span(late_ms: list[float]) -> tuple[float, float]:
+    first, last = 1e-3 * np.nanpercentile(late_ms, (10.0, 90.0))
+    return float(first), float(last)

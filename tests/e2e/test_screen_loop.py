@@ -6,22 +6,26 @@ from pathlib import Path
 
 import pytest
 
+from server.simulation.virtual_time import SimulationOptions
+from tests.bench.bench_screen import in_virtual_time
 from tests.e2e.screen_rig import lead
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 
 
-SECONDS = 8.0
-MOST_RMS_MM = 8.0
-"""Of 3.5 mm in virtual time (`bench_screen`)."""
+SECONDS, SEED = 8.0, 1000
+MOST_RATIO = 3.0
+"""To virtual time with pictures as late and as few as the machine let this flight have."""
 
 
 @pytest.mark.parametrize(("robot", "hand"), [("screen", "moving"), ("so101", "filming")])
 def test_a_robot_of_light_follows_a_phone_that_films_its_page(
     chromium: str, tmp_path: Path, robot: str, hand: str
 ) -> None:
-    flown = lead(chromium, tmp_path, robot, hand, seed=1000, seconds=SECONDS)
+    flown = lead(chromium, tmp_path, robot, hand, seed=SEED, seconds=SECONDS)
     print(flown)
     assert flown.tracked_s > SECONDS
-    assert flown.rms_mm < MOST_RMS_MM
+    alike = SimulationOptions(frame_rate_hz=flown.pictures_hz, latency_s=flown.late_s)
+    alike_mm = in_virtual_time(robot, hand, SEED, SECONDS, alike)
+    assert flown.rms_mm < MOST_RATIO * alike_mm
     assert flown.frames_hz > 40.0
