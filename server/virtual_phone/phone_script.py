@@ -19,8 +19,8 @@ DEVICE = VIRTUAL_DEVICE
 TOUCH_S = 1.0 / 30.0
 RELEASED_S = 0.3
 """Between a press that changed nothing and the next."""
-SYNCHRONISED_PONGS = 16
-"""After so many answers the server can date what comes, but by a network of jitter or 0.2 s."""
+SYNCHRONISED_PONGS = 10
+"""After so many answers the server can date what comes, unless the network is slow or jitters."""
 SCORE_STEP_S = 0.005
 ALL = np.ones(6, dtype=np.bool_)
 CODECS = {"jpeg": Codec.JPEG, "h264": Codec.H264, "vp8": Codec.VP8}
