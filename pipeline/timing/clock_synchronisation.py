@@ -28,8 +28,8 @@ UNSEEN_S: Final = 0.005
 SURE_S: Final = 0.1
 """Bound of the error until which nothing is dated: a page that hangs while it begins answers late
 and all at once, and what its first answers leave open would be slewed away for many seconds."""
-LATEST_S: Final = 1.0
-"""After the first answer the bound is taken as it is: the network is slow for good."""
+LATEST_S: Final = 0.4
+"""After the first answer what is known is taken as it is: the network is slow for good."""
 CONTRADICTIONS: Final = 3
 """So many in a row: the clock jumped. Meanwhile nothing is dated."""
 TOLERANCE_S: Final = 5e-4
@@ -167,8 +167,9 @@ class ClockSynchronisation:
         if error < min(0.75 * self._widest, self._widest - UNSEEN_S):
             self._answers, self._widest = 0, error
         self._answers += 1
-        is_narrow = error <= SURE_S or waited_s >= LATEST_S
-        return self._answers >= NEEDED and is_narrow
+        if waited_s >= LATEST_S:
+            return len(self._trips) >= NEEDED
+        return self._answers >= NEEDED and error <= SURE_S
 
     def _refit(self, t: float) -> ClockLine:
         """The line through what still agrees; a rate that has changed costs the older half."""

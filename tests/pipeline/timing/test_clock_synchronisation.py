@@ -94,7 +94,7 @@ def test_the_error_is_never_beyond_its_bound(seed, offset, ppm, least, jitter, s
     remote = Remote(seed, offset, 1e-6 * ppm, (least, least + jitter), spikes)
     clock = ClockSynchronisation()
     t, error, bound = ask(clock, remote, 0.0, 20.0).T
-    assert len(t) > 350
+    assert len(t) > 390
     assert (np.abs(error) <= bound + 1e-4).all()
     assert np.abs(error[t > 10.0]).max() <= 0.5 * least + 0.15 * jitter + 1e-4
     assert clock.restarts == 0
@@ -188,10 +188,10 @@ def test_a_page_that_hangs_as_it_begins_misdates_nothing(hung_s):
     assert np.abs(rows[rows[:, 0] > hung_s + 0.2, 1]).max() < 3e-3
 
 
-def test_a_network_that_is_slow_for_good_is_waited_for_a_second():
+def test_a_network_that_is_slow_for_good_is_waited_for_no_longer_than_it_helps():
     remote, clock = Remote(delay=(0.18, 0.2), spikes=0.0), ClockSynchronisation()
     t, error, bound = ask(clock, remote, 0.0, 10.0).T
-    assert LATEST_S < t[0] < LATEST_S + 1.0
+    assert LATEST_S < t[0] < LATEST_S + 0.5
     assert (np.abs(error) <= bound).all()
 
 
