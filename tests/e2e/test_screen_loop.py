@@ -14,8 +14,9 @@ pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 
 
 SECONDS, SEED = 8.0, 1000
-MOST_RATIO = 3.0
-"""To virtual time with pictures as late and as few as the machine let this flight have."""
+MOST_RMS_MM, MOST_RATIO = 8.0, 3.0
+"""Of 3.5 mm in virtual time (`bench_screen`); or the ratio to virtual time with pictures as late
+and as few as the machine let this flight have."""
 
 
 @pytest.mark.parametrize(("robot", "hand"), [("screen", "moving"), ("so101", "filming")])
@@ -27,5 +28,5 @@ def test_a_robot_of_light_follows_a_phone_that_films_its_page(
     assert flown.tracked_s > SECONDS
     alike = SimulationOptions(frame_rate_hz=flown.pictures_hz, latency_s=flown.late_s)
     alike_mm = in_virtual_time(robot, hand, SEED, SECONDS, alike)
-    assert flown.rms_mm < MOST_RATIO * alike_mm
+    assert flown.rms_mm < max(MOST_RMS_MM, MOST_RATIO * alike_mm)
     assert flown.frames_hz > 40.0
