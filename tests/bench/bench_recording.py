@@ -12,7 +12,6 @@ import os
 import sys
 import tempfile
 import time
-import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
@@ -32,7 +31,8 @@ from tests.e2e.serving import Serving, serving
 
 TURN_S: Final = 15.0
 MOST_SHARE = 0.01
-CPU: Final = "process_cpu_seconds_total "
+CPU: Final = "process_cpu_seconds_total"
+"""Of the process that records."""
 COLUMNS: Final = (
     ("what", "recording", "{}"),
     ("turns", "turns", "{}"),
@@ -67,23 +67,14 @@ class Written:
         return Written(self.seconds + seconds, count, self.size + path.stat().st_size)
 
 
-def cpu_s(server: Serving) -> float:
-    """Of the process that records, as its metrics tell [s]."""
-    headers = {"Authorization": f"Bearer {server.supervisor_token}"}
-    request = urllib.request.Request(f"{server.http_url}/metrics", headers=headers)
-    with urllib.request.urlopen(request, timeout=5.0) as response:
-        lines = response.read().decode().splitlines()
-    return float(next(line for line in lines if line.startswith(CPU)).removeprefix(CPU))
-
-
 def turn(server: Serving, written: Written, *, records: bool) -> tuple[float, Written]:
     """(share of a core, what is written by now) of one turn."""
     if records:
         server.request("POST", "/api/recording")
-    began, used = time.monotonic(), cpu_s(server)
+    began, used = time.monotonic(), server.metric(CPU)
     time.sleep(TURN_S)
     took = time.monotonic() - began
-    share = (cpu_s(server) - used) / took
+    share = (server.metric(CPU) - used) / took
     if records:
         path = server.request("DELETE", "/api/recording")["path"]
         written = written.with_file(Path(str(path)), took)

@@ -61,12 +61,22 @@ class Serving:
 
     def request(self, method: str, path: str, body: object = None) -> dict[str, object]:
         """A request as supervisor; gives its JSON."""
+        answer: dict[str, object] = json.loads(self._answer(method, path, body))
+        return answer
+
+    def metric(self, name: str) -> float:
+        """A figure without labels, as /metrics tells it. Raises ValueError if it does not, once."""
+        lines = self._answer("GET", "/metrics").decode().splitlines()
+        (value,) = (line.split()[1] for line in lines if line.startswith(f"{name} "))
+        return float(value)
+
+    def _answer(self, method: str, path: str, body: object = None) -> bytes:
         headers = {"Authorization": f"Bearer {self.supervisor_token}"}
         data = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(self.http_url + path, data, headers, method=method)
         with urllib.request.urlopen(request, timeout=5.0) as response:
-            answer: dict[str, object] = json.loads(response.read())
-            return answer
+            told: bytes = response.read()
+            return told
 
 
 @contextlib.contextmanager

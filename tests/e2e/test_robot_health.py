@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-import urllib.request
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -61,16 +60,6 @@ def volts(server: Serving) -> float:
     return 0.0
 
 
-def told_volts(server: Serving) -> float:
-    """As /metrics tells it."""
-    headers = {"Authorization": f"Bearer {server.supervisor_token}"}
-    request = urllib.request.Request(f"{server.http_url}/metrics", headers=headers)
-    with urllib.request.urlopen(request, timeout=5.0) as response:
-        lines = response.read().decode().splitlines()
-    (volts,) = (line.split()[1] for line in lines if line.startswith("lightleash_robot_battery_v"))
-    return float(volts)
-
-
 def recorded(path: Path) -> list[list[object]]:
     """(level, voltage) of each status of a recording."""
     said = (json.loads(entry.data)["health"] for entry in read(path).entries(STATUS))
@@ -97,7 +86,7 @@ def test_a_battery_drains_in_flight_is_told_everywhere_and_keeps_the_robot_from_
         shown = status(server)
         assert shown["mode"] == "TRACK"
         assert "bring it to rest now" in str(shown["health"])
-        assert told_volts(server) == pytest.approx(EMPTY_V, abs=0.2)
+        assert server.metric("lightleash_robot_battery_volts") == pytest.approx(EMPTY_V, abs=0.2)
     refused = str(status(server)["refusals"])
     assert "battery is empty" in refused
     assert "charge it before arming" in refused
