@@ -26,7 +26,7 @@ def test_a_robot_of_light_follows_a_phone_that_films_its_page(
     flown = lead(chromium, tmp_path, robot, hand, seed=SEED, seconds=SECONDS)
     print(flown)
     assert flown.tracked_s > SECONDS
-    alike = SimulationOptions(frame_rate_hz=flown.pictures_hz, latency_s=flown.late_s)
-    alike_mm = in_virtual_time(robot, hand, SEED, SECONDS, alike)
-    assert flown.rms_mm < max(MOST_RMS_MM, MOST_RATIO * alike_mm)
     assert flown.frames_hz > 40.0
+    if flown.rms_mm >= MOST_RMS_MM:
+        alike = SimulationOptions(frame_rate_hz=flown.pictures_hz, latency_s=flown.late_s)
+        assert flown.rms_mm < MOST_RATIO * in_virtual_time(robot, hand, SEED, SECONDS, alike)
