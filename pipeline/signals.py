@@ -173,6 +173,9 @@ class VisionMeasurement:
     """Tangents of half the field of view, to the side and up."""
     offset: StampOffset | None = None
     """Coarse time offset of the stamps, once it is known."""
+    is_drawn: bool = False
+    """Its lights are drawn on a glass, ahead of what robot and phone do: none says when the picture
+    was taken, the glass does."""
     lie: str = ""
     """Why none of the camera's pictures is believed now, nor quite what they said before."""
 

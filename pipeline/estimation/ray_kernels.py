@@ -116,7 +116,8 @@ def fuse_rays(
     The time offset takes 1 − 1/(1 + (v/still)⁴) of its correction, v [rad/s] being how fast the
     LEDs move through the picture (RMS): of slow ones, what a picture is off is not noise but a
     codec's dead zone, a sensor's rounding or a bias. Hundreds of pictures share that, and it would
-    pass for a delay. A partial update (Brink 2017, Partial-Update Schmidt-Kalman Filter, JGCD 40).
+    pass for a delay. Infinite: it takes nothing. A partial update (Brink 2017, Partial-Update
+    Schmidt-Kalman Filter, JGCD 40).
     """
     m = len(use)
     H, miss, expected = np.zeros((m, 2, 7)), np.zeros((m, 2)), np.zeros(2)

@@ -329,7 +329,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
                 np.array(rays.tangents, dtype=np.float64, order="C"),  # compiled for such alone
                 np.array(rays.covariances, dtype=np.float64, order="C"),
                 self._gate,
-                self._still,
+                np.inf if seen.is_drawn else self._still,
                 use,
             )
         )

@@ -102,7 +102,7 @@ class RobotOfLight:
         self.lag: DisplayLag | None = None
         """Of the display, once it is measured; followed from then on."""
         self._t_lag = -np.inf
-        self._is_shown = False
+        self.is_shown = False
         """To the camera in use, since its lag was fit."""
         self._views: GlassViews | None = None
         self._turns = TurnMeter()
@@ -116,7 +116,7 @@ class RobotOfLight:
         self._eye, self.eye = EyeTracker(self.glass), None
         # through another lens lights seem elsewhere, which a meter would take for a lag
         self._meter = self._new_meter()
-        self._tracker, self._is_shown = LagTracker(), False
+        self._tracker, self.is_shown = LagTracker(), False
         self._lens = LensMeter(camera, self.glass) if is_guessed else None
         self._turns = TurnMeter()
         self._views = GlassViews(camera, self.glass, SPREAD_S)
@@ -173,9 +173,9 @@ class RobotOfLight:
 
     def _is_fit(self, lag: DisplayLag) -> bool:
         """Whether it may be led by; one that no longer is, is measured from nothing."""
-        is_fit = lag.is_fit(is_shown=self._is_shown)
-        if not is_fit and self._is_shown:
-            self._is_shown, self._meter = False, self._new_meter()
+        is_fit = lag.is_fit(is_shown=self.is_shown)
+        if not is_fit and self.is_shown:
+            self.is_shown, self._meter = False, self._new_meter()
         return is_fit
 
     def _measure(self, t: float, places: Array) -> None:
@@ -235,7 +235,7 @@ class RobotOfLight:
             leds_in_g = hanging.leds_in_g(R_from_wxyz(wxyz[i]), p[i], self._leds_in_b)
             places[k] = pierced(eye.at(t), leds_in_g)
         self._tracker.add_drawn(start + DRAWN * STEP_S, places[DRAWN])
-        self._is_shown = True
+        self.is_shown = True
         return Lights("robot", self._misplaced(eye), start, places)
 
     def _misplaced(self, eye: Eye) -> str:

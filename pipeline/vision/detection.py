@@ -42,6 +42,8 @@ class Detection:
     """What the picture shows if gravity, which denies it, is left out."""
     offset: StampOffset | None = None
     """Coarse, of the picture's stamp, for who knows it."""
+    is_drawn: bool = False
+    """See `VisionMeasurement`."""
     bounded: bool = False
     """There was more light in the picture than time to try it all: the next one goes on."""
     prior: FramePrior = field(default_factory=FramePrior)
@@ -55,5 +57,12 @@ class Detection:
         """Vision measurement for a filter; None if it says nothing of the robot."""
         if self.pose is None and len(self.rays) == 0 and not self.lie:
             return None
-        half_field = camera.half_field
-        return VisionMeasurement(self.t, self.rays, self.pose, half_field, self.offset, self.lie)
+        return VisionMeasurement(
+            t=self.t,
+            rays=self.rays,
+            pose=self.pose,
+            half_field=camera.half_field,
+            offset=self.offset,
+            is_drawn=self.is_drawn,
+            lie=self.lie,
+        )

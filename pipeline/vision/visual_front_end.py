@@ -86,7 +86,7 @@ class VisualFrontEnd:
         self.check = PictureCheck(leds_in_b, motion)
         self.doubts_gravity = False
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
-        self._t_doubt = -np.inf
+        self._t_doubt, self._is_drawn = -np.inf, False
 
     def add_imu(self, *samples: PhoneImu | BodyImu) -> None:
         """Follow the motion of phone and robot; any thread may say it, the next frame heeds it."""
@@ -96,9 +96,9 @@ class VisualFrontEnd:
         """Follow what a filter says; None: it says nothing."""
         self._predictions.add(expected)
 
-    def dated_by(self, offset: StampOffset | None) -> None:
-        """What stands still in these pictures says when they were taken; None: nothing does."""
-        self._stamps.told = offset
+    def films_glass(self, offset: StampOffset | None) -> None:
+        """A robot that is drawn; the glass says when pictures were taken, None: not yet."""
+        self._is_drawn, self._stamps.told = True, offset
 
     def blinks(self, code: BlinkCode | None) -> None:
         """The robot blinks so from now on; None: its LEDs shine."""
@@ -119,7 +119,7 @@ class VisualFrontEnd:
         judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
         if judged.pose is not None:
             self._watched(frame, judged, judged.pose, prior)
-        judged = self._checked(judged)
+        judged = replace(self._checked(judged), is_drawn=self._is_drawn)
         if judged.pose is None and judged.unbelieved is None and self.doubts_gravity:
             return replace(judged, unbelieved=self._without_gravity(frame))
         return judged

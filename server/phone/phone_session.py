@@ -145,8 +145,8 @@ class PhoneSession:
                 if self.vision is not None:
                     self.vision.front_end.add_imu(sample)
                     self.vision.front_end.doubts_gravity = self._check.doubts_gravity
-                    if self._screen is not None:
-                        self.vision.front_end.dated_by(self._screen.time_offset)
+                    if self._screen is not None and self._screen.is_shown:
+                        self.vision.front_end.films_glass(self._screen.time_offset)
             case TouchState() as operator:
                 self.meters["operator"].tick(now, operator.t)
                 self.pressed = operator if operator.held else self.pressed

@@ -36,6 +36,10 @@ class ScreenDoor(Protocol):
         """What the phone's camera has shown of it; None: nothing yet, or there is none."""
 
     @property
+    def is_shown(self) -> bool:
+        """Whether the robot that the phone's camera films is drawn there."""
+
+    @property
     def time_offset(self) -> StampOffset | None:
         """Of the stamps of who films it, by the glass; None while it is not sure."""
 

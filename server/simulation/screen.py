@@ -144,7 +144,8 @@ class ScreenSimulation(VirtualTimeSimulation):
             return
         if look.seen is not None:
             self.robot_of_light.add_seen(look.seen, look.lights_in_c, self.t)
-        self._frame_pipeline.front_end.dated_by(self.robot_of_light.time_offset)
+        if self.robot_of_light.is_shown:
+            self._frame_pipeline.front_end.films_glass(self.robot_of_light.time_offset)
 
     def _film(self, camera: Camera, t: float, _: BodyHistory, rng: np.random.Generator) -> Image:
         """A picture of the glass taken at `t` [s]."""

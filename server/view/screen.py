@@ -113,6 +113,11 @@ class Screen:
         return self._thread.lens_of(camera) if self._thread is not None else None
 
     @property
+    def is_shown(self) -> bool:
+        """Whether the robot that the phone's camera films is drawn there."""
+        return self._thread is not None and self._thread.is_shown
+
+    @property
     def time_offset(self) -> StampOffset | None:
         """Of the stamps of who films it, by the glass; None while it is not sure."""
         return self._thread.time_offset if self._thread is not None else None
@@ -144,6 +149,7 @@ class LightsThread:
         self._guess, self._t_guess = "", -np.inf
         self.why = ""
         self.time_offset: StampOffset | None = None
+        self.is_shown = False
         """See `Screen`; as of the last step."""
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="screen", daemon=True)
@@ -207,6 +213,7 @@ class LightsThread:
             self._take(self._news.popleft(), t)
         shown = self._robot.step(t, self._ahead)
         self.why, self.time_offset = shown.why, self._robot.time_offset
+        self.is_shown = self._robot.is_shown
         if shown.phase == "search" and t - self._t_guess < WHY_S:
             self.why = self._guess
         return self._message(shown)

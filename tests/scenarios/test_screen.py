@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from hardware.robot_file import COMMANDS, load_robot
+from hardware.sim.hand import make_hand
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import TeleopConfig
 from server.control.process import teleop_config
@@ -63,10 +64,14 @@ def test_a_lag_believed_20_ms_too_short_costs_no_more_than_its_first_seconds(see
 
 
 @pytest.mark.slow
-def test_an_arm_is_led_as_a_robot_of_light():
-    scene = SimulationOptions(hand="filming", seed=1012)
+@pytest.mark.parametrize(("seed", "rest_s"), [(1012, 0.0), (1000, 8.0), (1001, 8.0)])
+def test_an_arm_is_led_as_a_robot_of_light(seed, rest_s):
+    """Also by a hand that rests first: its light goes on ahead by what it was told, no picture's
+    time is to be learnt by that."""
     arm = load_robot("so101", takes=COMMANDS)
-    simulation = ScreenSimulation(arm, TeleopConfig(), scene, Display())
+    hand = make_hand("filming", seed=seed, start=arm.start, rest_s=rest_s)
+    scene = SimulationOptions(hand="filming", seed=seed, frame_rate_hz=15.0)
+    simulation = ScreenSimulation(arm, TeleopConfig(), scene, Display(), hand=hand)
     figures = result_of(simulation.run(10.0), simulation.scene, 0.0)
     assert figures.tracked_s > 3.0
     assert not figures.ended

@@ -153,6 +153,30 @@ def test_what_biases_seemed_to_do_at_a_wrong_time_offset_is_forgotten(world, arr
     assert not estimator._bias_steps.walks.any()
 
 
+@pytest.mark.parametrize("is_drawn", [False, True])
+def test_lights_that_are_drawn_say_nothing_of_the_time_offset(is_drawn):
+    """But the glass does, whose word is taken."""
+    world = World(WorldOptions(seed=11, duration=2.0, time_offset=0.01))
+    flight = Flight(world, events(world))
+
+    def filmed(sample, offset=None):
+        is_picture = isinstance(sample, VisionMeasurement)
+        return replace(sample, is_drawn=is_drawn, offset=offset) if is_picture else sample
+
+    flight.to(1.5, filmed)
+    health = flight.filter.health
+    learnt, sigma = health.time_offset, health.time_offset_sigma
+    if is_drawn:
+        assert abs(learnt) < 1e-9
+        assert sigma == pytest.approx(0.02, rel=0.01)
+    else:
+        assert learnt == pytest.approx(0.01, abs=2e-3)
+        assert sigma < 2e-3
+    flight.to(2.0, lambda sample: filmed(sample, StampOffset(0.01, 2e-4)))
+    assert flight.filter.health.time_offset == pytest.approx(0.01, abs=1e-3)
+    assert flight.filter.pictures[Fusion.STARTED] == 1
+
+
 @pytest.mark.parametrize(("off_s", "begins"), [(0.0, 1), (0.01, 1), (-0.01, 1), (0.12, 2)])
 def test_a_filter_unsure_of_time_takes_the_offset_that_another_found_and_goes_on(off_s, begins):
     """Unless it is farther off than the filter may be: then it begins again."""

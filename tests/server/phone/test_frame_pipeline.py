@@ -21,6 +21,7 @@ from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
 ROBOT = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot
 ZERO, UP = np.zeros(3), np.array([0.0, 0.0, 1.0])
 DT = 1.0 / 30.0
+GLASS_SAYS = StampOffset(0.004, 0.001)
 CODECS = {"h264": Codec.H264, "vp8": Codec.VP8, "jpeg": Codec.JPEG}
 
 
@@ -186,19 +187,26 @@ def test_after_a_lost_picture_nothing_is_decoded_before_a_key():
 
 
 def test_a_few_leds_where_control_expects_them_are_rays_without_a_pose():
+    """Also of a robot that is drawn on a glass, of whose lights the filter is told that."""
     rng = np.random.default_rng(90)
     eye, truth, camera_side = frame_pipeline(), truth_at(rng), encoder()
-    for k in range(8):
+    for k in range(10):
         for t in (k * DT - 0.01, k * DT + 0.01):
             eye.front_end.add_prediction(Prediction(t, truth.p, truth.R, ZERO, 0.005, 0.005))
-        covered = () if k < 3 else (0, 2, 4)
+        if k == 8:
+            eye.front_end.films_glass(GLASS_SAYS)
+        covered = (0, 2, 4) if 3 <= k < 9 else ()
         shot = sent(k, *camera_side.encode(picture(truth, rng, covered=covered)))
         detection = look(eye, [shot], truth)
-        assert (detection.pose is None) == (k >= 3)
-    assert sorted(detection.rays.led.tolist()) == [1, 3]
-    assert detection.reason == "2 of 5 LEDs seen."
+        assert (detection.pose is None) == bool(covered)
+        if covered:
+            assert sorted(detection.rays.led.tolist()) == [1, 3]
+            assert detection.reason == "2 of 5 LEDs seen."
+        seen = detection.seen(CAMERA)
+        assert seen.is_drawn == (k >= 8)
+        assert seen.offset == (GLASS_SAYS if k == 9 else None)
     eye.front_end.add_prediction(None)
-    shot = sent(8, *camera_side.encode(picture(truth, rng, covered=(0, 2, 4))))
+    shot = sent(10, *camera_side.encode(picture(truth, rng, covered=(0, 2, 4))))
     assert len(look(eye, [shot], truth).rays) == 0
 
 

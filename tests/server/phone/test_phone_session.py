@@ -397,7 +397,7 @@ def test_a_recording_is_not_told_of_a_calibration_that_its_pictures_have_not(rig
 class OpenableScreen:
     """A place of a screen that only says whether one is there."""
 
-    is_open, why = False, ""
+    is_open, is_shown, why = False, False, ""
 
     def __init__(self) -> None:
         self.lens: SimpleLens | None = None
@@ -459,6 +459,11 @@ def test_eyes_are_told_when_pictures_were_taken_by_the_glass_that_they_film() ->
     rig.say(JPEG)
     assert rig.phone.vision is not None
     eyes = rig.phone.vision.front_end
+    screen.time_offset = StampOffset(0.008, 0.001)
+    rig.t += 0.02
+    rig.say(FLAT)
+    assert eyes.offset_s == 0.0  # it films a robot that is there, if any
+    screen.is_shown = True
     for screen.time_offset in (None, StampOffset(0.004, 0.001), None):
         rig.t += 0.02
         rig.say(FLAT)

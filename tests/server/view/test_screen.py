@@ -98,8 +98,10 @@ def test_a_phone_that_films_is_shown_a_sweep_and_then_the_robot(make):
     assert "four corners" in thread.why
     assert filmed(thread, 1.0, 0.03, since=1.0).phase == "sweep"
     assert thread.why == MEASURES
+    assert not thread.is_shown
     lights = filmed(thread, 2.5, 0.03, since=2.0)
     assert lights.phase == "robot"
+    assert thread.is_shown
     assert lights.lag_ms == pytest.approx(30.0, abs=1.0)
     assert lights.why == ""
     assert lights.t_ms == pytest.approx(1e3 * (2.0 + 149 / 60.0 + 0.01) + lights.lag_ms)

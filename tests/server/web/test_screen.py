@@ -47,6 +47,7 @@ class Door:
         raise AssertionError("no phone is here")
 
     least_height_m = 0.16
+    is_shown = False
     time_offset = None
 
     def lens_of(self, camera):
