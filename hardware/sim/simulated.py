@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -117,10 +118,11 @@ class SimulatedRobot:
         self.dark: deque[int] = deque(maxlen=HISTORY)
         """The LED that was dark then, −1: none."""
         self._tells_motion, odometry = robot.motion is not None, robot_file.plant.odometry
-        self._odometry = None
+        self._odometry, self._twist_late_s = None, 0.0 if options is None else options.twist_late_s
         if odometry is not None:  # encoders have a noise of their own
             noisy = robot.axes & (robot_file.plant.arm is None)
-            self._odometry = Odometry(odometry, noisy, rng)
+            late = replace(odometry, latency_s=odometry.latency_s + self._twist_late_s)
+            self._odometry = Odometry(late, noisy, rng)
         self._nonces, self._boot_id = nonces, boot_id
         self._setpoint = self.end.setpoint(0)
 
@@ -172,6 +174,7 @@ class SimulatedRobot:
         given, age_s = self._setpoint, NOT_MEASURED
         if self._odometry is not None:
             given, age_s = self._odometry.read(now_us, self.body.given)
+            age_s = max(age_s - self._twist_late_s, 0.0)
         return self.end.sample(now_us, nonce, NO_FORCE, NO_FORCE, given, age_s)
 
 

@@ -14,19 +14,33 @@ from pipeline.so3_kernels import kernel, put_exp
 
 TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
 """Error states that a picture depends on: δp, θ, and its time."""
+TOLD_SHARE = 3.0
+"""Of how fast LEDs pass by a motion that is told: so much faster than by that they must pass before
+half is believed about the time offset."""
 
 
 @kernel
 def _expect(
-    x: Array, R: Array, inputs: Array, led: Array, ahead: float, expected: Array, H: Array
+    x: Array,
+    R: Array,
+    inputs: Array,
+    told: Array,
+    led: Array,
+    ahead: float,
+    expected: Array,
+    H: Array,
 ) -> bool:
-    """Tangents (2,) of an LED `ahead` seconds later, H (2, 7) by `TOUCHED`; False: not in front."""
+    """Tangents (2,) of an LED `ahead` seconds later, H (2, 8); False: not in front.
+
+    H is by `TOUCHED`, and last how fast it passes by the motion that a body tells of itself. `told`
+    (4,) is that body's velocity in c, which x has not, and 1; of another one zeros.
+    """
     arm, w = R @ led, inputs[6:9]
     q0, q1, q2 = x[0] + arm[0], x[1] + arm[1], x[2] + arm[2]
     if not q0 > NEAREST_M:
         return False
     b = inputs[0:3]
-    by_body = R @ np.array(
+    by_body = told[0:3] + R @ np.array(
         [
             b[1] * led[2] - b[2] * led[1],
             b[2] * led[0] - b[0] * led[2],
@@ -46,6 +60,7 @@ def _expect(
             d_m = H[row, 0] * R[0, m] + H[row, 1] * R[1, m] + H[row, 2] * R[2, m]
             H[row, 3 + j] = d_m * led[k] - d_k * led[m]
         H[row, 6] = (rate - tangent * v0) / q0
+        H[row, 7] = told[3] * (by_body[1 + row] - tangent * by_body[0]) / q0
         expected[row] = tangent + H[row, 6] * ahead
     return True
 
@@ -100,6 +115,7 @@ def fuse_rays(
     R: Array,
     P: Array,
     inputs: Array,
+    told: Array,
     leds_in_b: Array,
     ahead: Array,
     tangents: Array,
@@ -108,21 +124,22 @@ def fuse_rays(
     still: float,
     use: Flags,
 ) -> float:
-    """Fuse the rays of a picture (m,), each `ahead` seconds after x, R, P.
+    """Fuse the rays of a picture (m,), each `ahead` seconds after x, R, P; `told` as `_expect`.
 
     `use` (m,): −1 is decided here, against the state before the picture, 0 is left out, 1 is fused.
     Gives χ² of the fused ones, two degrees of freedom each; NaN: P can't be believed.
 
-    The time offset takes 1 − 1/(1 + (v/still)⁴) of its correction, v [rad/s] being how fast the
+    The time offset takes 1 − 1/(1 + (v/slow)⁴) of its correction, v [rad/s] being how fast the
     LEDs move through the picture (RMS): of slow ones, what a picture is off is not noise but a
     codec's dead zone, a sensor's rounding or a bias. Hundreds of pictures share that, and it would
-    pass for a delay. Infinite: it takes nothing. A partial update (Brink 2017, Partial-Update
-    Schmidt-Kalman Filter, JGCD 40).
+    pass for a delay. So would the delay of a motion that is told: slow is `still`, and `TOLD_SHARE`
+    of how fast LEDs pass by that. Infinite: it takes nothing. A partial update (Brink 2017,
+    Partial-Update Schmidt-Kalman Filter, JGCD 40).
     """
     m = len(use)
-    H, miss, expected = np.zeros((m, 2, 7)), np.zeros((m, 2)), np.zeros(2)
+    H, miss, expected = np.zeros((m, 2, 8)), np.zeros((m, 2)), np.zeros(2)
     for i in range(m):
-        if not _expect(x, R, inputs, leds_in_b[i], ahead[i], expected, H[i]):
+        if not _expect(x, R, inputs, told, leds_in_b[i], ahead[i], expected, H[i]):
             use[i] = 0
             continue
         miss[i] = tangents[i] - expected
@@ -130,12 +147,13 @@ def fuse_rays(
             use[i] = 1 if _unlikelihood(P, H[i], covariances[i], miss[i]) <= gate else 0
     n, chi2, variance = P.shape[0], 0.0, P[OFFSET, OFFSET]
     dx, v = np.zeros(n), np.empty(n)
-    count, square = 0, 0.0
+    count, square, told_square = 0, 0.0, 0.0
     for i in range(m):
         if use[i] != 1:
             continue
         count += 1
         square += H[i, 0, 6] * H[i, 0, 6] + H[i, 1, 6] * H[i, 1, 6]
+        told_square += H[i, 0, 7] * H[i, 0, 7] + H[i, 1, 7] * H[i, 1, 7]
         a = sqrt(covariances[i, 0, 0])
         b = covariances[i, 1, 0] / a
         c = sqrt(covariances[i, 1, 1] - b * b)
@@ -146,7 +164,8 @@ def fuse_rays(
         chi2 += _fuse_scalar(P, dx, H[i, 0], miss[i, 0], v)
         chi2 += _fuse_scalar(P, dx, H[i, 1], miss[i, 1], v)
     if count > 0 and still > 0.0:
-        left = 1.0 / (1.0 + (square / count / (still * still)) ** 2)
+        slow = still * still + TOLD_SHARE * TOLD_SHARE * told_square / count
+        left = 1.0 / (1.0 + (square / count / slow) ** 2)
         dx[OFFSET] *= 1.0 - left
         P[OFFSET, OFFSET] += left * left * (variance - P[OFFSET, OFFSET])
     correct(x, R, dx)
@@ -183,6 +202,7 @@ def misfit(
     x: Array,
     R: Array,
     inputs: Array,
+    told: Array,
     leds_in_b: Array,
     ahead: Array,
     tangents: Array,
@@ -193,10 +213,10 @@ def misfit(
 
     Neither motion nor what was predicted enters: it tells of the spots alone.
     """
-    H, expected, miss = np.empty((2, 7)), np.empty(2), np.empty(2)
+    H, expected, miss = np.empty((2, 8)), np.empty(2), np.empty(2)
     A = np.zeros((7, 7))  # of the normal equations, last row and column the misses
     for i in range(len(use)):
-        if use[i] != 1 or not _expect(x, R, inputs, leds_in_b[i], ahead[i], expected, H):
+        if use[i] != 1 or not _expect(x, R, inputs, told, leds_in_b[i], ahead[i], expected, H):
             continue
         miss[:] = tangents[i] - expected
         a = sqrt(covariances[i, 0, 0])

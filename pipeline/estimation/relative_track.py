@@ -44,7 +44,7 @@ KEPT: Final = 2 * WINDOW
 """Samples up to the base that are still interpolated from, or learnt from."""
 MISLED: Final = (0.05, 0.05, 0.3)
 """By so much place [m], attitude [rad] and velocity [m/s] may be wrong before a tone is known."""
-NOTHING_TOLD: Final = np.zeros(3)
+NOTHING_TOLD: Final = np.zeros(4)
 AMPLITUDES: Final = 12
 """Of a tone."""
 BENT: Final = 2
@@ -264,9 +264,8 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         leds, inputs = self._leds_in_b[rays.led], self._inputs(here)
         tangents = np.array(rays.tangents, dtype=np.float64, order="C")
         C = np.array(rays.covariances, dtype=np.float64, order="C")
-        x = here.x.copy()
-        x[3:6] += self.told_velocity(here)
-        return float(misfit(x, here.R, inputs, leds, ahead, tangents, C, use)), freedoms
+        told = self._told_at(here)
+        return float(misfit(here.x, here.R, inputs, told, leds, ahead, tangents, C, use)), freedoms
 
     def in_picture(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `here`: that is doubted too.
@@ -286,13 +285,16 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
 
     def told_velocity(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """(3,) in c [m/s] of a body that tells its own, which x has not; zeros of another."""
+        return self._told_at(here)[:3]
+
+    def _told_at(self, here: Checkpoint[VisionMeasurement]) -> Array:
+        """(4,) as `ray_kernels` takes it."""
         if self._told is None:
             return NOTHING_TOLD
         times, said = self.body.times, np.empty(TOLD)
         last = int(np.searchsorted(times, here.t, side="right")) - 1
         sample_at(times, self.body.values, last, here.t, said)
-        told: Array = here.R @ said[6:9]
-        return told
+        return np.append(here.R @ said[6:9], 1.0)
 
     def inputs_now(self) -> Array:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
@@ -316,14 +318,14 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
     def _fuse(
         self, here: Checkpoint[VisionMeasurement], seen: VisionMeasurement, use: Flags
     ) -> float:
-        rays, told = seen.rays, self.told_velocity(here)
-        here.x[3:6] += told  # LEDs pass by all of it
-        chi2 = float(
+        rays = seen.rays
+        return float(
             fuse_rays(
                 here.x,
                 here.R,
                 here.P,
                 self._inputs(here),
+                self._told_at(here),
                 self._leds_in_b[rays.led],
                 rays.t + (here.x[X_OFFSET] - here.t),
                 np.array(rays.tangents, dtype=np.float64, order="C"),  # compiled for such alone
@@ -333,8 +335,6 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
                 use,
             )
         )
-        here.x[3:6] -= told
-        return chi2
 
     def _is_sound(self, here: Checkpoint[VisionMeasurement]) -> bool:
         return bool(is_sound(here.x, here.R, here.P))

@@ -1,7 +1,8 @@
 """A simulated robot that is not built as its file says: what bring-up is there to find.
 
 Exchanged plugs, motors that turn the wrong way, propellers of the other hand, motion sensors that
-are mounted turned, thrusters that give more or less, slower ones, a body of another weight.
+are mounted turned, thrusters that give more or less, slower ones, a body of another weight, and
+a twist that is older than it says.
 """
 
 from __future__ import annotations
@@ -61,6 +62,8 @@ class AsBuilt(Section):
     inertia_kg_m2: Vector | None = None
     lag_s: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     vibration: VibrationSection | None = None
+    twist_late_s: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0
+    """A twist that it measures is dated so much too late."""
 
     def plant(self, known: PlantParameters) -> PlantParameters:
         """What it is, by what its file says.
@@ -114,7 +117,7 @@ class AsBuilt(Section):
         """What of it is no number of a plant."""
         v = self.vibration
         shakes = None if v is None else Vibration(v.hz, v.rate_rad_s, v.force_m_s2)
-        return PlantOptions(vibration=shakes, R_sb=self._R_sb())
+        return PlantOptions(vibration=shakes, R_sb=self._R_sb(), twist_late_s=self.twist_late_s)
 
     def _R_sb(self) -> Array | None:
         """(3, 3) from the body's axes to those in which samples come; None: they are the same."""

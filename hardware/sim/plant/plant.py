@@ -38,6 +38,8 @@ class PlantOptions:
     """Of propellers, felt by the body's sensors."""
     R_sb: Array | None = None
     """(3, 3) from b to the axes in which its sensors give samples; None: to those of b."""
+    twist_late_s: float = 0.0
+    """So much older than it says is the twist that a robot without motion sensors measures [s]."""
     obstacle: Obstacle | None = None
     """A tool on the robot and a wall before it."""
     tube: Tube | None = None

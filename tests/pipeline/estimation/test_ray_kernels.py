@@ -13,7 +13,7 @@ from pipeline.frames import R_from_rpy, exp, log
 LEDS = np.array([[0.28, 0.0, 0.05], [0.0, 0.3, -0.06], [-0.05, -0.3, -0.03], [-0.2, 0.05, 0.2]])
 GATE = 13.8
 FELT = np.array([0.3, -0.8, 0.5, 0.1, 0.2, 9.8, 0.4, 0.6, -0.7, 0.3, 0.1, 9.7])
-HERE = np.zeros(4)
+HERE, NOTHING_TOLD = np.zeros(4), np.zeros(4)
 
 
 def state(pitch=0.3):
@@ -51,7 +51,7 @@ def picture(x, R, noise=1e-3, seed=3):
 def fuse(x, R, P, tangents, C, ahead=HERE, gate=GATE, use=None, leds=LEDS, still=0.0):
     """(χ², use); x, R, P are changed."""
     use = np.full(len(leds), -1, dtype=np.int8) if use is None else use
-    return fuse_rays(x, R, P, FELT, leds, ahead, tangents, C, gate, still, use), use
+    return fuse_rays(x, R, P, FELT, NOTHING_TOLD, leds, ahead, tangents, C, gate, still, use), use
 
 
 @pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2])
@@ -59,23 +59,42 @@ def test_expected_tangents_and_jacobian_are_the_readable_ones(pitch):
     """Which finite differences vouch for, the derivative by time included: `test_gravity_free`."""
     x, R, _ = state(pitch)
     for led in LEDS:
-        place, H = np.empty(2), np.full((2, 7), np.nan)
-        assert ray_kernels._expect(x, R, FELT, led, 0.01, place, H)
+        place, H = np.empty(2), np.full((2, 8), np.nan)
+        assert ray_kernels._expect(x, R, FELT, NOTHING_TOLD, led, 0.01, place, H)
         there, dense = expected(x, R, led, 0.01)
         assert np.abs(place - there).max() < 1e-14
-        assert np.abs(H - dense[:, TOUCHED]).max() < 1e-13
+        assert np.abs(H[:, :7] - dense[:, TOUCHED]).max() < 1e-13
+        assert not H[:, 7].any()
         assert not np.delete(dense, TOUCHED, axis=1).any()
+
+
+def test_a_motion_that_is_told_moves_leds_and_is_told_apart():
+    x, R, _ = state()
+    v, ahead, by_phone = np.array([0.3, -0.2, 0.4]), 0.02, FELT.copy()
+    by_phone[:3] = 0.0
+    told, whole = np.append(v, 1.0), x.copy()
+    whole[3:6] += v
+    for led in LEDS:
+        (place, H), (other, alone) = ((np.empty(2), np.empty((2, 8))) for _ in range(2))
+        assert ray_kernels._expect(x, R, FELT, told, led, ahead, place, H)
+        there, dense = expected(whole, R, led, ahead)
+        assert place == pytest.approx(there)
+        np.testing.assert_allclose(H[:, :7], dense[:, TOUCHED])
+        assert ray_kernels._expect(x, R, by_phone, NOTHING_TOLD, led, ahead, other, alone)
+        np.testing.assert_allclose(H[:, 6] - H[:, 7], alone[:, 6])
+        assert not alone[:, 7].any()
+        assert np.abs(H[:, 7]).max() > 0.01
 
 
 def test_the_compiled_jacobian_is_that_of_finite_differences():
     x, R, _ = state()
-    place, H, e = np.empty(2), np.empty((2, 7)), 1e-5
+    place, H, e = np.empty(2), np.empty((2, 8)), 1e-5
 
     def seen(error):
         moved = RelativeMotion(x[:3] + error[:3], R @ exp(error[3:6]), x[3:6])
         return gravity_free.seen_at(moved, LEDS[0])
 
-    ray_kernels._expect(x, R, FELT, LEDS[0], 0.0, place, H)
+    ray_kernels._expect(x, R, FELT, NOTHING_TOLD, LEDS[0], 0.0, place, H)
     columns = np.array([(seen(e * k) - seen(-e * k)) / (2.0 * e) for k in np.eye(6)]).T
     assert np.abs(H[:, :6] - columns).max() < 1e-9
 
@@ -236,6 +255,23 @@ def test_of_slow_leds_nothing_is_believed_about_the_time_offset():
     assert whole[2][OFFSET, OFFSET] < P[OFFSET, OFFSET]
     np.testing.assert_allclose(held[2][np.ix_(rest, rest)], whole[2][np.ix_(rest, rest)])
     np.testing.assert_allclose(np.delete(held[0], X_OFFSET), np.delete(whole[0], X_OFFSET))
+
+
+def test_of_leds_that_pass_by_what_is_told_little_is_believed_about_the_time_offset():
+    """Of the same picture all is, where sensors of the body's own say that it moves so."""
+    x, R, P = state()
+    tangents, offsets, speed = picture(x, R), {}, np.array([2.0, -2.0, 1.0])
+    for name, told in (("felt", NOTHING_TOLD), ("told", np.append(speed, 1.0))):
+        here, there, known = x.copy(), R.copy(), P.copy()
+        if name == "felt":
+            here[3:6] += speed
+        before = here[X_OFFSET]
+        use = np.full(len(LEDS), -1, dtype=np.int8)
+        C = covariances(4)
+        fuse_rays(here, there, known, FELT, told, LEDS, HERE, tangents, C, GATE, 0.01, use)
+        offsets[name] = here[X_OFFSET] - before, known[OFFSET, OFFSET] / P[OFFSET, OFFSET]
+    assert abs(offsets["told"][0]) < 0.1 * abs(offsets["felt"][0])
+    assert offsets["told"][1] > 0.8 > 0.5 > offsets["felt"][1]
 
 
 def test_of_fast_leds_all_is_believed_about_the_time_offset():

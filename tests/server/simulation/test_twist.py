@@ -9,6 +9,8 @@ import pytest
 
 from hardware.link.datagram import decode_command, encode_command
 from hardware.robot_file import COMMANDS, load_robot
+from hardware.sim.hand import make_hand
+from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.virtual_time_follower import KEY
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.signals import Mode
@@ -146,3 +148,20 @@ def test_commands_that_are_not_to_be_believed_move_nothing(flight, kind):
     way_m, moves = forked(partial(tampered, flight, kind))
     assert way_m < 0.0005
     assert moves < 1e-4
+
+
+@pytest.mark.parametrize("seed", [1000, 1001])
+def test_an_arm_whose_twist_is_older_than_it_says_is_led_by_a_hand_that_rests_first(seed):
+    """What that seems to say of the pictures' time is not believed: it held, and came down."""
+    arm = load_robot("so101", takes=COMMANDS)
+    hand = make_hand("filming", seed=seed, start=arm.start, rest_s=8.0)
+    scene = SimulationOptions(hand="filming", seed=seed, frame_rate_hz=15.0)
+    late = PlantOptions(twist_late_s=0.02)
+    loop = VirtualTimeSimulation(arm, TeleopConfig(), scene, hand=hand, plant=late)
+    modes, offsets_s = set(), []
+    while loop.t < 12.0:
+        modes.add(loop.advance().failsafe.mode)
+        offsets_s.append(loop.controller.teleop.estimator.health.time_offset)
+    assert modes == {Mode.DISARMED, Mode.ARMED, Mode.TRACK}
+    assert np.nanmax(np.abs(offsets_s)) < 0.02
+    assert rms(loop.trace.error_in_f) < 0.010

@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware.robot_file import load_robot
+from hardware.link.datagram import decode_sample
+from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from hardware.robot_physics import allocation_matrix
 from hardware.sim.plant.built import AsBuilt, as_built
 from hardware.sim.plant.plant import Plant
+from hardware.sim.simulated import SimulatedRobot, seeded_nonces
 from tests.e2e.robot_rig import ENVIRONMENT
+from tests.hardware.rigs import KEY
 
 AMES = load_robot("ames")
 KNOWN = replace(AMES.plant, lag=1e-3, delay=0.0)
@@ -66,6 +69,30 @@ def test_sensors_that_sit_turned_give_samples_along_their_own_axes() -> None:
     real = turned(AsBuilt(imu_axes=["y", "-x", "z"]), 2)
     # the body's x lies along their y, its y against their x
     np.testing.assert_allclose(real[:3], (-told[1], told[0], told[2]), atol=1e-12)
+
+
+def told(robot_file: RobotFile, built: AsBuilt) -> list[tuple[np.ndarray, float]]:
+    """(twist (6,), its age [s]) of half a second's samples."""
+    robot = SimulatedRobot(robot_file, 0, 7, seeded_nonces(0), KEY, built.options())
+    samples = []
+    for k in range(100):
+        sample = decode_sample(robot.tick(5_000 * (k + 1))[0], KEY)
+        assert sample.twist_in_b is not None
+        assert sample.twist_age_s is not None
+        samples.append((np.array(sample.twist_in_b), sample.twist_age_s))
+    return samples
+
+
+def test_a_twist_that_is_dated_too_late_is_as_old_as_it_is_and_says_less() -> None:
+    rover = load_robot("rover", takes=COMMANDS)
+    assert rover.plant.odometry is not None
+    older = replace(rover.plant.odometry, latency_s=rover.plant.odometry.latency_s + 0.02)
+    honest = replace(rover, plant=replace(rover.plant, odometry=older))
+    late = told(rover, AsBuilt(twist_late_s=0.02))
+    for (twist, age_s), (same, true_s) in zip(late, told(honest, AsBuilt()), strict=True):
+        np.testing.assert_array_equal(twist, same)
+        assert age_s == pytest.approx(max(true_s - 0.02, 0.0), abs=1e-6)
+    assert max(age_s for _, age_s in late) > 0.02
 
 
 @pytest.mark.parametrize(
