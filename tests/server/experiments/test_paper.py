@@ -14,7 +14,7 @@ from hardware.robot_file import load_robot
 from server.cli import main
 from server.experiments.paper import comparison, disturbance, picture, table_1, table_4
 from server.experiments.paper.setup import assumptions, flight, published
-from server.experiments.paper.setup.flight import ExperimentTrace, Push
+from server.experiments.paper.setup.flight import ExperimentTrace, Move, Push
 from server.experiments.paper.setup.measure import WINDOW_S, ExperimentSetup, cell_of
 from server.experiments.paper.setup.variants import (
     WITH_EKF,
@@ -132,6 +132,16 @@ def test_a_push_comes_when_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     away = pushed.missed_in_b[:, 1] - left.missed_in_b[:, 1]
     assert np.abs(away[pushed.t < 0.1]).max() < 1e-9
     assert away[-1] > 1e-3  # the body is pushed to −y: short of its reference
+
+
+def test_each_move_is_flown_by_pictures_too_and_as_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An encoder's threads are not in a copy of the process: the flight waited for ever."""
+    monkeypatch.setattr(flight, "HOVER_S", 2.5)
+    setup = ExperimentSetup(AMES, phone(pictures="h264"), (1,))
+    (each,) = setup.fly_each(WITH_EKF, [Move("step_x")], 0.3)
+    (alone,) = setup.fly(WITH_EKF, "step_x", 0.3)
+    assert len(alone.t) > 10
+    np.testing.assert_array_equal(each[0].error_in_b, alone.error_in_b)
 
 
 def test_pictures_of_a_phone_are_as_late_and_as_many_as_asked_for() -> None:
