@@ -15,7 +15,7 @@ from pipeline.so3_kernels import kernel, put_exp
 TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
 """Error states that a picture depends on: δp, θ, and its time."""
 TOLD_SHARE = 3.0
-"""Of how fast LEDs pass by a motion that is told: so much faster than by that they must pass before
+"""Of how fast LEDs pass by a motion that is measured and told: so much faster than by that they must pass before
 half is believed about the time offset."""
 
 
@@ -32,8 +32,9 @@ def _expect(
 ) -> bool:
     """Tangents (2,) of an LED `ahead` seconds later, H (2, 8); False: not in front.
 
-    H is by `TOUCHED`, and last how fast it passes by the motion that a body tells of itself. `told`
-    (4,) is that body's velocity in c, which x has not, and 1; of another one zeros.
+    H is by `TOUCHED`, and last how fast it passes by the motion that a body measures and tells.
+    `told` (4,) is the velocity in c of a body that tells its own, which x has not, and whether that
+    is measured, 1 or 0; of another one zeros.
     """
     arm, w = R @ led, inputs[6:9]
     q0, q1, q2 = x[0] + arm[0], x[1] + arm[1], x[2] + arm[2]

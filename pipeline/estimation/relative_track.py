@@ -63,6 +63,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """
         super().__init__(X, N, MOVING, BENT, KEPT)
         self._told = self._vertical = None
+        self._is_measured = float(motion is not None and motion.is_measured)
         if motion is not None:
             self._told, self._vertical = ToldTwist(motion), ToldVertical(motion)
             self.body = ImuStream(more=TOLD - BODY)
@@ -294,7 +295,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         times, said = self.body.times, np.empty(TOLD)
         last = int(np.searchsorted(times, here.t, side="right")) - 1
         sample_at(times, self.body.values, last, here.t, said)
-        return np.append(here.R @ said[6:9], 1.0)
+        return np.append(here.R @ said[6:9], self._is_measured)
 
     def inputs_now(self) -> Array:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
