@@ -15,8 +15,8 @@ from pipeline.so3_kernels import kernel, put_exp
 TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
 """Error states that a picture depends on: δp, θ, and its time."""
 TOLD_SHARE = 3.0
-"""Of how fast LEDs pass by a motion that is measured and told: so much faster than by that they must pass before
-half is believed about the time offset."""
+"""Of how fast LEDs pass by a motion that is measured and told: so much faster than by that they
+must pass before half is believed about the time offset."""
 
 
 @kernel
