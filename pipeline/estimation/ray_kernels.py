@@ -133,9 +133,9 @@ def fuse_rays(
     The time offset takes 1 − 1/(1 + (v/slow)⁴) of its correction, v [rad/s] being how fast the
     LEDs move through the picture (RMS): of slow ones, what a picture is off is not noise but a
     codec's dead zone, a sensor's rounding or a bias. Hundreds of pictures share that, and it would
-    pass for a delay. So would the delay of a motion that is told: slow is `still`, and `TOLD_SHARE`
-    of how fast LEDs pass by that. Infinite: it takes nothing. A partial update (Brink 2017,
-    Partial-Update Schmidt-Kalman Filter, JGCD 40).
+    pass for a delay. So would the delay of a motion that is measured and told: slow² is `still`²
+    and (`TOLD_SHARE` times how fast LEDs pass by that)². Infinite: it takes nothing. A partial
+    update (Brink 2017, Partial-Update Schmidt-Kalman Filter, JGCD 40).
     """
     m = len(use)
     H, miss, expected = np.zeros((m, 2, 8)), np.zeros((m, 2)), np.zeros(2)

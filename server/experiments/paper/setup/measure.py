@@ -49,7 +49,7 @@ class ExperimentSetup:
         An encoder of pictures has threads, without which a copy of it waits for ever.
         """
         if self.leader.pictures != "spots":
-            return [[one.run(move, seconds) for one in self._flights(variant)] for move in moves]
+            return [self.fly(variant, move.hand, seconds, move.push) for move in moves]
         traces: list[list[ExperimentTrace]] = [[] for _ in moves]
         for flight in self._flights(variant):
             flight.hover()
