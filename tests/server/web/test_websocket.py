@@ -157,17 +157,19 @@ def test_a_silent_operator_loses_its_place_and_what_it_says_later_reaches_nobody
 
 def test_what_a_synchronised_phone_says_reaches_control_on_our_clock(server):
     async def scene():
+        began = now()
         async with server.operator() as page:
             nonce = await page.synchronise()
-            asked = now()
             await page.send(FLAT)
-            await page.touch(nonce, held=True)
+            made = now()
+            touch = Record(1, int(1e6 * made), Touch(True, True, 1, nonce))
+            await page.socket.send(encode(touch))
             heard = await server.control_hears(lambda m: isinstance(m, TouchState))
             (sample,) = (m for m in heard if isinstance(m, PhoneImu))
-            (touch,) = (m for m in heard if isinstance(m, TouchState))
-            assert sample.t == pytest.approx(asked, abs=0.5)
-            assert touch.held
-            assert touch.t <= asked
+            (touch_state,) = (m for m in heard if isinstance(m, TouchState))
+            assert sample.t == pytest.approx(made, abs=0.5)
+            assert touch_state.held
+            assert began <= touch_state.t <= made
 
     play(server, scene)
 
