@@ -175,6 +175,8 @@ class TimeOffsetConfig:
     """Of a picture's attitude without a covariance, one axis [rad]."""
     floor_R: float = 0.0005
     """Of the gyroscopes' turns over the window [rad]."""
+    late_s: float = 0.05
+    """By so much a robot without motion sensors may tell its motion later than it says, 1 σ."""
     floor_s: float = 0.0005
     """No offset is known better."""
     max_sigma_s: float = 0.0025

@@ -36,15 +36,17 @@ class LedSensorModel:
         noise_px: float,
         hidden: Callable[[float], Sequence[int]],
         rng: np.random.Generator,
+        is_told: bool = False,
     ) -> None:
         """`leds_in_b` (n, 3) as the robot file has them [m]; where they are the phone knows.
 
+        The robot's motion `is_told`, or felt by sensors.
         `noise_px`: standard deviation of an LED's place, each way; `hidden` as the phone's.
         """
         self._phone, self._leds_in_b, self._hidden = phone, leds_in_b, hidden
         self._noise_px, self._rng = noise_px, rng
         self._imus = ImuStreams()
-        self._stamps = CameraImuDelay(self._imus)
+        self._stamps = CameraImuDelay(self._imus, is_told)
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Follow a motion sample, for the pictures' time offset."""

@@ -5,6 +5,9 @@ attitude and slow biases; the pictures say the same at their own stamps. Of all 
 the one that fits best is the offset, if no other fits nearly as well: tremor repeats itself after a
 ninth of a second, and a wrong lock is worse than none. The filter refines it online as a state
 (Li & Mourikis, Int. J. Robotics Research 33 (2014) 947).
+
+A robot that tells its motion in place of sensing it may tell it late: then its turns date pictures
+only as far as that lateness is known, and the phone's have to.
 """
 
 from __future__ import annotations
@@ -53,6 +56,8 @@ class _AttitudeByShift:
     """(shifts, 4): start of the camera's gyroscope ← start of the body's."""
     wxyz_b: Array
     """(4,) start of the body's gyroscope ← b, for a shift of 0."""
+    turns_on: Array
+    """(shifts, 3) of the body until `late_s` later, in the axes of its gyroscope's start [rad]."""
     covariance: Array
     """(3, 3) of the picture's attitude, in the axes of the left side [rad²]."""
 
@@ -60,9 +65,10 @@ class _AttitudeByShift:
 class TimeOffset:
     """Streaming: give it all pictures, ask it now and then."""
 
-    def __init__(self, config: TimeOffsetConfig, imus: ImuStreams) -> None:
-        """Begin without a picture; somebody else fills `imus`."""
+    def __init__(self, config: TimeOffsetConfig, imus: ImuStreams, is_told: bool = False) -> None:
+        """Begin without a picture; somebody else fills `imus`, the body's as `is_told` or felt."""
         self._config, self._imus = config, imus
+        self._late_s = config.late_s if is_told else 0.0
         steps = round(config.reach_s / config.step_s)
         self._shifts: Array = config.step_s * np.arange(-steps, steps + 1, dtype=np.float64)
         self._gap_end = np.inf
@@ -105,7 +111,7 @@ class TimeOffset:
             self._seen.clear()
             self._new = config.every
         self._gap_end = gap_end
-        while self._waiting and self._waiting[0][0] + reach <= until:
+        while self._waiting and self._waiting[0][0] + reach + self._late_s <= until:
             t, wxyz_cb, C_in_c = self._waiting.popleft()
             if t - reach < since or (self._seen and t <= self._seen[-1].t):
                 continue
@@ -114,7 +120,11 @@ class TimeOffset:
             wxyz = product(product(from_camera, wxyz_cb), conjugate(from_body))
             middle = len(times) // 2
             R_ic = R_from_wxyz(from_camera[middle])
-            self._seen.append(_AttitudeByShift(t, wxyz, from_body[middle], R_ic @ C_in_c @ R_ic.T))
+            later = body.attitudes(times + self._late_s) if self._late_s > 0.0 else from_body
+            turns_on = small_vectors(product(later, conjugate(from_body)))
+            self._seen.append(
+                _AttitudeByShift(t, wxyz, from_body[middle], turns_on, R_ic @ C_in_c @ R_ic.T)
+            )
             self._new += 1
         while self._seen and self._seen[0].t < self._seen[-1].t - config.window_s:
             self._seen.popleft()
@@ -155,6 +165,14 @@ class TimeOffset:
         basis, _ = np.linalg.qr((W @ self._explained(middle)).reshape(3 * len(seen), 6))
         left = flat - basis @ (basis.T @ flat)
         chi2: Array = np.square(left).sum(axis=0)
+        if self._late_s == 0.0:
+            return chi2
+        R_ij = R_from_wxyz(middle.wxyz[len(self._shifts) // 2])
+        late = np.array([one.turns_on for one in seen]) @ (W @ R_ij).T
+        late = late.transpose(0, 2, 1).reshape(3 * len(seen), -1)
+        late -= basis @ (basis.T @ late)
+        # best share of `late_s`, of which nothing is known but that it is 0 ± 1
+        chi2 -= np.square((late * left).sum(axis=0)) / (np.square(late).sum(axis=0) + 1.0)
         return chi2
 
     def _explained(self, middle: _AttitudeByShift) -> Array:

@@ -77,7 +77,8 @@ class VisualFrontEnd:
             camera, leds_in_b, imus=imus if motion is None else None, blinks=blinks
         )
         self._phone, self._body = ImuBuffer(imus.phone), ImuBuffer(imus.body)
-        self._predictions, self._stamps = PredictionHistory(), CameraImuDelay(imus)
+        self._predictions = PredictionHistory()
+        self._stamps = CameraImuDelay(imus, is_told=motion is not None)
         self.monitor, self.readout = (
             CalibrationMonitor(camera, leds_in_b, imus),
             LineDelay(camera.readout_s),
@@ -86,7 +87,7 @@ class VisualFrontEnd:
         self.check = PictureCheck(leds_in_b, motion)
         self.doubts_gravity = False
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
-        self._t_doubt, self._is_drawn = -np.inf, False
+        self._t_doubt = -np.inf
 
     def add_imu(self, *samples: PhoneImu | BodyImu) -> None:
         """Follow the motion of phone and robot; any thread may say it, the next frame heeds it."""
@@ -98,7 +99,7 @@ class VisualFrontEnd:
 
     def films_glass(self, offset: StampOffset | None) -> None:
         """A robot that is drawn; the glass says when pictures were taken, None: not yet."""
-        self._is_drawn, self._stamps.told = True, offset
+        self._stamps.films_glass(offset)
 
     def blinks(self, code: BlinkCode | None) -> None:
         """The robot blinks so from now on; None: its LEDs shine."""
@@ -119,7 +120,7 @@ class VisualFrontEnd:
         judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
         if judged.pose is not None:
             self._watched(frame, judged, judged.pose, prior)
-        judged = replace(self._checked(judged), is_drawn=self._is_drawn)
+        judged = replace(self._checked(judged), is_drawn=self._stamps.is_drawn)
         if judged.pose is None and judged.unbelieved is None and self.doubts_gravity:
             return replace(judged, unbelieved=self._without_gravity(frame))
         return judged

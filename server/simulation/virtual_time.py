@@ -388,8 +388,15 @@ def make_vision_model(
     """What stands for pictures and vision in a scene without them."""
     if scene.led_noise_px is None:
         return None
-    rng, leds_in_b = np.random.default_rng((scene.seed, 11)), robot_file.robot.leds_in_b
-    return LedSensorModel(script.phone, leds_in_b, scene.led_noise_px, scene.hidden_at, rng)
+    rng, robot = np.random.default_rng((scene.seed, 11)), robot_file.robot
+    return LedSensorModel(
+        script.phone,
+        robot.leds_in_b,
+        scene.led_noise_px,
+        scene.hidden_at,
+        rng,
+        is_told=robot.motion is not None,
+    )
 
 
 def make_script(

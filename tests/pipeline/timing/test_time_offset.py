@@ -24,10 +24,13 @@ STEADY = (0.005, float(np.deg2rad(0.4)))
 STILL = (1e-6, 1e-6)
 
 
-def listen(setup, spoil=lambda sample: sample):
+MOVING = (0.05, float(np.deg2rad(3.0)))
+
+
+def listen(setup, spoil=lambda sample: sample, is_told=False):
     """What is answered after each picture: [(t, offset or None, reason)]."""
     imus, answers = ImuStreams(), []
-    finder = TimeOffset(TimeOffsetConfig(), imus)
+    finder = TimeOffset(TimeOffsetConfig(), imus, is_told)
     for arrival, arrived in events(World(setup)):
         sample = spoil(arrived)
         if isinstance(sample, PhoneImu | BodyImu):
@@ -44,7 +47,14 @@ def found(answers):
     return [(t, offset) for t, offset, _ in answers if offset is not None]
 
 
-@pytest.mark.parametrize("hand", [(0.05, float(np.deg2rad(3.0))), STEADY])
+def told_late(late_s):
+    """The body's samples dated later than they were, as a polled bus does."""
+    return lambda sample: (
+        replace(sample, t=sample.t + late_s) if isinstance(sample, BodyImu) else sample
+    )
+
+
+@pytest.mark.parametrize("hand", [MOVING, STEADY])
 @pytest.mark.parametrize("td", [0.0, -0.02, 0.04, -0.08])
 def test_offsets_are_found_within_seconds_and_with_an_honest_sigma(hand, td):
     seed = round(1e3 * td + 1e5 * hand[0])
@@ -86,6 +96,25 @@ def test_an_offset_beyond_reach_is_refused_and_named(td):
     answers = listen(WorldOptions(seed=2, duration=4.0, time_offset=td))
     assert not found(answers)
     assert f"{1e3 * td:+.0f} ms" in answers[-1][2]
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.02])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_body_that_tells_its_motion_late_dates_no_picture(seed, late_s):
+    setup = WorldOptions(seed=seed, duration=5.0, hand_sigma=STILL, robot_sigma=MOVING)
+    answers = listen(setup, told_late(late_s), is_told=True)
+    assert not found(answers)
+    assert answers[-1][2] == time_offset.STILL
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.02, 0.05])
+@pytest.mark.parametrize("td", [0.0, 0.04])
+def test_the_phone_s_own_turns_date_pictures_of_a_body_that_tells_late(td, late_s):
+    setup = WorldOptions(seed=1, duration=5.0, time_offset=td, hand_sigma=MOVING)
+    offsets = found(listen(setup, told_late(late_s), is_told=True))
+    assert offsets[0][0] < 4.5
+    for _, offset in offsets:
+        assert abs(offset.value_s - td) < min(WRONG_S, 4.5 * offset.sigma_s)
 
 
 def test_hands_at_rest_are_asked_to_move():
