@@ -15,7 +15,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import av
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from hardware.follower import FollowerState, TwistCommand
@@ -26,10 +28,12 @@ from hardware.link.robot_server import TICK_US
 from hardware.robot_file import COMMANDS, load_robot
 from hardware.twist_schema import TOLD_ZERO_S
 from pipeline.frames import Array
+from server.export.command import main as export
 from server.process.robot_key import key_file
 from tests.counterparts.betaflight import FOLDER
 from tests.counterparts.lab_body import RunningBody
 from tests.e2e.serving import serving
+from tests.server.export.recordings import FLIGHT
 
 pytestmark = pytest.mark.counterpart
 ROOT = Path(__file__).parents[2]
@@ -53,6 +57,25 @@ rows = d.hf_dataset.with_format(None)
 print(json.dumps([d.meta.features["action"]["names"], rows["action"][:],
                   rows["observation.state"][:], rows["timestamp"][:], d.num_episodes]))
 """
+ITEMS = """
+import json, sys
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+root, *numbers = sys.argv[1:]
+d = LeRobotDataset("me/flight", root=root, video_backend="pyav")
+items = [d[int(number)] for number in numbers]
+print(json.dumps([[i["action"].tolist(), i["observation.state"].tolist(), i["task"],
+                   (255 * i["observation.images.phone"].mean((0, 1))).tolist()] for i in items]))
+"""
+"""What it loads of a dataset by the numbers of rows: numbers, task, and columns of the picture."""
+LINT = "lerobot-lint==0.1.1"
+OF_JOINTS = {
+    *("DEAD_JOINT", "SATURATED_JOINT", "DISCONTINUITY"),
+    *("ACTION_STATE_DIVERGENCE_CRASHED", "ACTION_RANGE_MISMATCH_CRASHED"),
+}
+"""Of checks that take a state for joints' angles, and an action for as many: ours is the pose and
+velocity of a body that hovers, and thrusts. Times, rate, film and tasks are judged without them."""
+MOST_GREY = 3.0
+"""Between two decoders' grey [1/255]."""
 
 
 def shown(after: str) -> list[str]:
@@ -224,3 +247,49 @@ def test_a_phone_leads_lerobots_robot_by_the_real_server(programs, tmp_path):
     assert phone_says["rms_mm"] < MOST_MM
     path = np.array(body.lab.path)
     assert np.ptp(path, axis=0).max() > MOVED_M
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory) -> Path:
+    """A recorded flight, as a dataset of one episode."""
+    folder = tmp_path_factory.mktemp("exported")
+    words = ["--to", "lerobot", "--out", str(folder), "--task", "follow"]
+    assert export([str(FLIGHT), *words]) == 0
+    return folder / "virtual_phone.lerobot"
+
+
+def ran(programs: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """One of LeRobot's programs, without the internet, to its end."""
+    around = {**os.environ, "HF_HUB_OFFLINE": "1", "HOME": str(folder), "PYTHONPATH": ""}
+    return subprocess.run(
+        [str(programs / words[0]), *words[1:]],
+        cwd=folder, env=around, capture_output=True, text=True, timeout=RECORD_S,
+    )  # fmt: skip
+
+
+def test_lerobot_loads_the_first_the_last_and_any_item_of_an_export(programs, exported, tmp_path):
+    rows = pq.read_table(exported / "data/chunk-000/file-000.parquet").to_pylist()
+    with av.open(str(next(exported.glob("videos/**/*.mp4")))) as film:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    numbers = [0, len(rows) - 1, *np.random.default_rng(0).integers(0, len(rows), 3).tolist()]
+    done = ran(programs, tmp_path, "python", "-c", ITEMS, str(exported), *map(str, numbers))
+    assert done.returncode == 0, done.stderr[-3000:]
+    items = json.loads(done.stdout.splitlines()[-1])
+    for number, (action, state, task, columns) in zip(numbers, items, strict=True):
+        assert action == pytest.approx(rows[number]["action"], abs=1e-6)
+        assert state == pytest.approx(rows[number]["observation.state"], abs=1e-6)
+        assert task == "follow"
+        assert columns == pytest.approx(pictures[number].mean((0, 2)), abs=MOST_GREY)
+
+
+def test_lerobot_lint_finds_nothing_but_that_a_pose_is_no_row_of_joints(
+    programs, exported, tmp_path
+):
+    for words in (["--no-deps", LINT], ["typer", "rich", "pyyaml"]):  # it is content with 0.4.4
+        bring([str(programs / "pip"), "install", "--quiet", *words], INSTALL_S)
+    report = tmp_path / "report.json"
+    done = ran(programs, tmp_path, "lelint", "check", str(exported), "--json", str(report))
+    assert report.exists(), done.stderr[-3000:]
+    findings = json.loads(report.read_text())["findings"]
+    assert {one["check"] for one in findings if one["severity"] == "error"} <= OF_JOINTS
+    assert {one["check"] for one in findings if one["severity"] == "warning"} <= OF_JOINTS
