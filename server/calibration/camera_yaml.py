@@ -10,6 +10,7 @@ from pipeline.frames import Array
 from server.calibration.lens import matrix
 from server.calibration.solve import CalibrationSolution
 from server.calibration.verdict import Verdict
+from server.common.runtime import replacement
 
 PROFILES = "cameras"
 """Folder of the state directory that `lightleash serve` looks into."""
@@ -120,10 +121,6 @@ def store(path: Path, text: str) -> None:
         CameraFileError: it could not be read again; nothing is written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    fresh = path.with_name(path.name + ".part")
-    try:
+    with replacement(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
         load_camera(fresh)  # what a fit found may be more than any camera's file may say
-        fresh.replace(path)
-    finally:
-        fresh.unlink(missing_ok=True)

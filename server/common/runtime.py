@@ -179,14 +179,34 @@ def new_private_file(path: Path) -> IO[bytes]:
 
 
 @contextmanager
-def whole_private_file(path: Path) -> Iterator[IO[bytes]]:
-    """The same; it is removed again if it does not get to its end."""
-    with new_private_file(path) as file:
+def whole_new_file(path: Path, *, private: bool = False) -> Iterator[IO[bytes]]:
+    """A new file, removed again if it does not get to its end.
+
+    Raises:
+        FileExistsError: there is one.
+    """
+    with open(path, "xb", opener=private_opener if private else None) as file:
         try:
             yield file
+            file.flush()
         except BaseException:  # half of it is of no use, and may be all that was left of the disk
             path.unlink()
             raise
+
+
+@contextmanager
+def replacement(path: Path, *, private: bool = False) -> Iterator[Path]:
+    """A path to write to: what is there at the end takes the place of `path`, or all stays."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        if private:
+            part.unlink(missing_ok=True)
+            new_private_file(part).close()
+        yield part
+        part.replace(path)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def private_opener(path: str, flags: int) -> int:
@@ -196,8 +216,5 @@ def private_opener(path: str, flags: int) -> int:
 
 def write_private(path: Path, text: str) -> None:
     """A whole file at once, for nobody else to read."""
-    part = path.with_suffix(".part")
-    part.unlink(missing_ok=True)
-    with new_private_file(part) as file:
-        file.write(text.encode())
-    part.replace(path)
+    with replacement(path, private=True) as part:
+        part.write_bytes(text.encode())

@@ -18,7 +18,7 @@ from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from server.common.runtime import whole_private_file
+from server.common.runtime import whole_new_file
 from server.protocol.messages import Status, decode_from_server
 from server.protocol.wire import VERSION
 from server.recording.writer import (
@@ -198,7 +198,7 @@ def recover(part: Path) -> Path:
             raise RecordingError(part, "is not an MCAP file", "name a *.mcap.part of a recording")
         source.seek(0)
         temporary.unlink(missing_ok=True)
-        with whole_private_file(temporary) as target:
+        with whole_new_file(temporary, private=True) as target:
             if not _copy_complete(source, target):
                 what = "holds nothing of Lightleash that can be rescued"
                 raise RecordingError(part, what, "name a *.mcap.part of a recording")

@@ -31,7 +31,7 @@ from mcap.writer import Writer
 
 import server
 from server.common import clock
-from server.common.runtime import new_private_file, whole_private_file
+from server.common.runtime import new_private_file, whole_new_file
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, VERSION
 from server.recording.episodes import EpisodeNote
@@ -228,7 +228,7 @@ def write_whole(
     Raises:
         OSError: there is a file of this name, or it can't be written: nothing of it stays.
     """
-    with whole_private_file(path) as file:
+    with whole_new_file(path, private=True) as file:
         writer, channels = start_file(file, metadata | OWN)
         for topic, t, data in items:
             _add(writer, channels[topic], _Item(topic, t, data))

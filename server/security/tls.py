@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from server.common.clock import utc
-from server.common.runtime import new_private_file, one_at_a_time, private_directory
+from server.common.runtime import one_at_a_time, private_directory, replacement
 from server.security.tls_limits import authority_limits, general_name, is_permitted
 
 LEAF_DAYS, AUTHORITY_DAYS = 397, 729
@@ -262,8 +262,5 @@ def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(path: Path, data: bytes) -> None:
-    part = path.with_suffix(".part")
-    part.unlink(missing_ok=True)
-    with new_private_file(part) as file:
-        file.write(data)
-    part.replace(path)
+    with replacement(path, private=True) as part:
+        part.write_bytes(data)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from hardware.robot_file import load_robot
+from server.common.runtime import replacement
 from server.experiments.all import provenance, results, running
 from server.experiments.all.page import Chapter, Ending, page
 from server.experiments.all.parts import PARTS, ReportPart
@@ -121,9 +122,8 @@ class Report:
         )
         text = page([self._chapter(part) for part in shown], ending)
         self._folder.mkdir(parents=True, exist_ok=True)
-        written = self._folder / f"{PAGE}.new"
-        written.write_text(text, encoding="utf-8", errors="replace")
-        written.replace(self._folder / PAGE)
+        with replacement(self._folder / PAGE) as written:
+            written.write_text(text, encoding="utf-8", errors="replace")
 
     def _chapter(self, part: ReportPart) -> Chapter:
         words, kept = part.words(self._quick), self._kept(part)

@@ -22,6 +22,7 @@ import msgspec
 
 from server.common.clock import now, utc
 from server.common.cluster.provenance import ROOT
+from server.common.runtime import replacement
 from server.experiments.runner import REFUSED
 
 Status = Literal["begun", "done", "missed", "refused", "failed"]
@@ -180,9 +181,8 @@ def _judged(code: int, folder: Path) -> tuple[Status, str]:
 
 
 def _write(folder: Path, record: RunRecord) -> None:
-    written = folder / f"{RECORD}.new"
-    written.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1))
-    written.replace(folder / RECORD)
+    with replacement(folder / RECORD) as written:
+        written.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1))
 
 
 def stamp() -> str:

@@ -31,6 +31,7 @@ from hardware.robot_text import (
 from pipeline.config import PERIOD_S
 from server.common import clock
 from server.common.ranges import MOST_PORT, number, whole
+from server.common.runtime import whole_new_file
 from server.common.settings import state_directory
 from server.common.text import Column, dashed, table
 from server.control import realtime
@@ -130,8 +131,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 1
     text = written(text, found, recording.name)
     robot_of(tomllib.loads(text), str(out))  # nothing is written that can't be loaded
-    with out.open("x", encoding="utf-8", newline="") as file:
-        file.write(text)
+    with whole_new_file(out) as file:
+        file.write(text.encode())
     print(f"written: {out}; before you fly it: lightleash robot check {out}")
     return int(bool(found.against))
 

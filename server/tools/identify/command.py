@@ -13,6 +13,7 @@ from pathlib import Path
 from hardware.robot_file import ROBOTS, load_robot, robot_of, robot_path
 from hardware.robot_text import RobotTextError, with_intervals, with_numbers
 from hardware.system_identification.fit import IdentificationError, IdentifiedPlant, identify
+from server.common.runtime import replacement
 from server.common.text import table
 from server.export.decoded import DecodedRecording, RecordedState
 from server.recording.reader import read
@@ -81,7 +82,8 @@ def run(arguments: argparse.Namespace) -> int:
         text = with_numbers(text, *file_numbers(robot_file.plant, numbers))
         text = with_intervals(text, file_intervals(numbers), "robot identify")
         robot_of(tomllib.loads(text), str(out))  # nothing is written that can't be loaded
-        out.write_text(text, encoding="utf-8", newline="")
+        with replacement(out) as new:
+            new.write_text(text, encoding="utf-8", newline="")
         where = sys.stderr if arguments.json else sys.stdout  # JSON stands alone
         print(f"written: {out}; before you fly it: lightleash robot check {out}", file=where)
     return int(bool(against))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from server.common.errors import InputError
+from server.common.runtime import replacement
 
 
 @contextmanager
@@ -18,15 +19,11 @@ def whole_file(path: Path) -> Iterator[Path]:
     Raises:
         InputError: it can't be written.
     """
-    part = path.with_name(f"{path.name}.part")
     try:
-        yield part
-        part.replace(path)
+        with replacement(path) as part:
+            yield part
     except OSError as error:
         raise InputError(path, "", f"can't be written: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 @contextmanager

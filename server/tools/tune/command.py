@@ -36,6 +36,7 @@ from pipeline.control.robust_margins import MAX_PEAK, MarginGoals
 from pipeline.gains import Gains
 from server.common.options import Parser
 from server.common.ranges import number
+from server.common.runtime import replacement
 from server.simulation.session import Figures, SweepSession, fly
 from server.tools.tune import table
 
@@ -92,9 +93,8 @@ def _tuned(arguments: argparse.Namespace) -> str:
     if not _flies(robot_table(path), {base: before, name: found}, arguments):
         raise TuningFlightError(f"{name} does not fly here: nothing is written")
     written = with_gains(content, name, found, comment, arguments.replace)
-    new = target.with_name(f"{target.name}.new")
-    new.write_text(written, encoding="utf-8", newline="")
-    new.replace(target)
+    with replacement(target) as new:
+        new.write_text(written, encoding="utf-8", newline="")
     return f"written: [gains.{name}] in {target}; fly it with --robot {target} --gains {name}"
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import resource
+from contextlib import contextmanager
+
 import pytest
 
 from server.common.runtime import (
@@ -11,9 +14,11 @@ from server.common.runtime import (
     is_running,
     launch_of,
     prepare,
+    replacement,
     runtime_directory,
     server_name,
     servers_here,
+    whole_new_file,
 )
 
 
@@ -81,3 +86,43 @@ def test_a_launch_file_that_makes_no_sense_tells_nothing(base):
     for text in ("", "{}", '{"name": "", "robot": "ames", "https_port": "x", "http_port": 1}'):
         (base / LAUNCH_FILE).write_text(text)
         assert launch_of(base) is None
+
+
+@contextmanager
+def full_disk(room):
+    """Of which `room` bytes are left to each file."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("private", [False, True])
+def test_a_file_is_replaced_by_a_whole_one_or_stays(tmp_path, private):
+    file = tmp_path / "robot.toml"
+    with replacement(file, private=private) as part:
+        part.write_text("name = 1\n")
+    assert file.read_text() == "name = 1\n"
+    assert not private or file.stat().st_mode & 0o077 == 0
+    with full_disk(8), pytest.raises(OSError, match="too large"):  # noqa: SIM117
+        with replacement(file, private=private) as part:
+            part.write_text("name = 22222222222\n")
+    assert [one.name for one in tmp_path.iterdir()] == [file.name]
+    assert file.read_text() == "name = 1\n"
+
+
+@pytest.mark.parametrize("private", [False, True])
+def test_a_new_file_is_whole_or_not_there_and_never_takes_another_s_place(tmp_path, private):
+    file = tmp_path / "robot.toml"
+    with full_disk(8), pytest.raises(OSError, match="too large"):  # noqa: SIM117
+        with whole_new_file(file, private=private) as new:
+            new.write(b"name = 22222222222\n")
+    assert not list(tmp_path.iterdir())
+    with whole_new_file(file, private=private) as new:
+        new.write(b"name = 1\n")
+    assert not private or file.stat().st_mode & 0o077 == 0
+    with pytest.raises(FileExistsError), whole_new_file(file, private=private):
+        pass
+    assert file.read_text() == "name = 1\n"
