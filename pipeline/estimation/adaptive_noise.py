@@ -20,8 +20,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-
+from pipeline.estimation.innovation_kernels import normalised, share_of
 from pipeline.frames import Array
 
 GAIN: Final = 0.1
@@ -56,8 +55,7 @@ class AdaptiveNoise:
         """
         S = P + C
         surprise = misfit(e, S)
-        share = float(np.trace(np.linalg.solve(S, P))) / 6.0
-        step = GAIN * share * (min(surprise, SURPRISE) - TOLERATED)
+        step = GAIN * share_of(P, S) * (min(surprise, SURPRISE) - TOLERATED)
         self._log = min(max(self._log + step, 0.0), math.log(MOST))
         if surprise <= FAR:
             return 1.0
@@ -71,4 +69,4 @@ class AdaptiveNoise:
 
 def misfit(e: Array, S: Array) -> float:
     """χ² of an innovation (n,) of covariance S (n, n), by its degrees of freedom."""
-    return float(e @ np.linalg.solve(S, e)) / len(e)
+    return float(normalised(e, S))

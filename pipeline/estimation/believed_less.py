@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.frames import Array
+from pipeline.frames import Array, skew
 from pipeline.signals import LedRays, RelativePose
 
 NO_TURN = np.zeros(3)
@@ -46,7 +46,7 @@ def widened_rays(
     """The same of the rays alone, of a robot at `p_bc_in_c` (3,) [m] and R_cb (3, 3)."""
     arms = leds_in_b[rays.led]
     q = p_bc_in_c + arms @ R_cb.T
-    moved = beside + np.cross(turned_in_b, arms) @ R_cb.T
+    moved = beside + arms @ (R_cb @ skew(turned_in_b)).T
     off = (moved[:, 1:] - rays.tangents * moved[:, :1]) / q[:, :1]
     shared = len(rays) * off[:, :, None] * off[:, None, :]
     return replace(rays, covariances=rays.covariances + shared)

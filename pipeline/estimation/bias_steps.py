@@ -10,11 +10,12 @@ Control 21 (1976) 108), by corrections instead of signatures.
 
 from __future__ import annotations
 
-from math import exp, inf, sqrt
+from math import exp, inf
 from typing import Final
 
 import numpy as np
 
+from pipeline.estimation.picture_kernels import put_chi2, put_corrections
 from pipeline.estimation.relative_kernels import BIASES, OFFSET
 from pipeline.frames import Array
 
@@ -36,8 +37,6 @@ AGAIN_S: Final = 3.0
 """Moved again so soon, it did not step: it walks."""
 FADE_S, QUICKLY = 5.0, 10.0
 """In which a walk is forgotten, and so many times sooner if it shows no more."""
-ROUNDING: Final = 1e-18
-"""No variance that pictures take from a bias is told from nothing below it [unit²]."""
 NOWHERE: Final = np.zeros(4)
 
 
@@ -69,29 +68,22 @@ class BiasSteps:
         keep = exp(min(self._t - t, 0.0) / MEMORY_S)
         fading = max(t - self._t, 0.0) / FADE_S
         self._t = max(t, self._t)
-        solved = np.linalg.solve(S, np.column_stack((P[:6, BIASES:OFFSET], e)))
-        surprise = float(e @ solved[:, 12]) / 6.0
-        cross = P[BIASES:OFFSET, :6]
-        if not 0.0 < surprise < BEYOND:
+        shift, reduction, chi2 = np.empty((4, 3)), np.empty((4, 3, 3)), np.empty(4)
+        if not 0.0 < put_corrections(e, S, P, SHARE, shift, reduction) < BEYOND:
             self.walks *= exp(-fading)
             return NOWHERE
-        shift = (cross @ solved[:, 12]).reshape(4, 3) * min(1.0, sqrt(SHARE / surprise))
-        reduction = _by_sensor(cross @ solved[:, :12])
-        after = _by_sensor(P[BIASES:OFFSET, BIASES:OFFSET]) - reduction
         self._shift = keep * self._shift + shift
         self._variance = keep * keep * self._variance + reduction
         self._learnt = keep * self._learnt + reduction
-        chi2 = (
-            np.sign(self._most)
-            * (self._shift * _solve(self._variance, self._shift)).sum(axis=1)
-            / 3.0
-        )
+        put_chi2(self._shift, self._variance, chi2)
+        chi2[self._most == 0.0] = 0.0
         # a walk that was believed too large draws corrections that are too small for it
         calm = np.clip(1.0 - chi2, 0.0, 1.0) * (QUICKLY - 1.0)
         self.walks *= np.exp(-fading * (1.0 + calm))
         if not chi2.max() > SURPRISING:
             return NOWHERE
         by: Array = np.zeros(4)
+        after = _by_sensor(P[BIASES:OFFSET, BIASES:OFFSET]) - reduction
         for k in np.flatnonzero(chi2 > ALIKE * chi2.max()).tolist():
             by[k] = self._moved(k, after[k])
             since = t - self.t_moved[k]
@@ -115,7 +107,3 @@ def _by_sensor(P: Array) -> Array:
     """(4, 3, 3) blocks on the diagonal of P (12, 12)."""
     blocks: Array = P.reshape(4, 3, 4, 3)[range(4), :, range(4)]
     return blocks
-
-
-def _solve(V: Array, v: Array) -> Array:
-    return np.asarray(np.linalg.solve(V + ROUNDING * np.eye(3), v[..., None])[..., 0])

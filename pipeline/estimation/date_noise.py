@@ -22,6 +22,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.believed_less import widened_rays
+from pipeline.estimation.innovation_kernels import lateness
 from pipeline.frames import Array
 from pipeline.signals import VisionMeasurement
 
@@ -59,14 +60,10 @@ class DateNoise:
             S: (6, 6) covariance of that, were its own date right.
             passing: (6,) how the predicted pose passes: ṗ in c [m/s], attitude in b [rad/s].
         """
-        solved = np.linalg.solve(S, np.column_stack((e, passing)))
-        information = float(passing @ solved[:, 1])
-        if not information > 0.0:
+        late_s, information, across = lateness(e, S, passing)
+        if not information > 0.0 or not isfinite(late_s):
             return
-        late_s = float(passing @ solved[:, 0]) / information
-        if not isfinite(late_s):
-            return
-        across = (float(e @ solved[:, 0]) - late_s * late_s * information) / (len(e) - 1.0)
+        across /= len(e) - 1.0
         known = max(1.0, across) / information
         (before_s, known_before), self._before = self._before, (late_s, known)
         own, known = exp(2.0 * self._log), 0.5 * (known + known_before)

@@ -9,9 +9,13 @@ import numpy as np
 
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.estimation.accelerometer_check import AccelerometerCheck
+from pipeline.estimation.adaptive_noise import AdaptiveNoise
+from pipeline.estimation.bias_steps import BiasSteps
+from pipeline.estimation.date_noise import DateNoise
 from pipeline.estimation.estimator import Estimator
 from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.paper_ekf import PaperEkf
+from pipeline.estimation.picture_kernels import pose_in_picture
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.frames import GRAVITY, Array
 from pipeline.robot import ToldMotion
@@ -56,6 +60,11 @@ def warm_up() -> None:
             pose = RelativePose(t, p, np.eye(3), 1e-4 * np.eye(6), 0.0, 4)
             estimator.add_seen(VisionMeasurement(t, rays, pose), t)
         estimator.state(0.05)
+    e, P = np.full(6, 1e-3), 1e-4 * np.eye(22)  # what a picture is only asked once it is dated
+    C = P[:6, :6].copy()
+    BiasSteps(np.ones(4)).learn(0.0, e, C, P)
+    DateNoise().learn(e, C, e)
+    AdaptiveNoise().judge(e, pose_in_picture(P, e), C)
     check = AccelerometerCheck()
     for t in (0.0, 0.01):
         check.add(t, still, up)

@@ -13,7 +13,8 @@ from pipeline.estimation.hand_motion_kernels import WINDOW
 from pipeline.estimation.hand_predictor import HandPredictor
 from pipeline.estimation.imu_interpolation_kernels import sample_at
 from pipeline.estimation.out_of_sequence import Checkpoint, OutOfSequence
-from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound, misfit
+from pipeline.estimation.picture_kernels import pose_in_picture, pose_rate
+from pipeline.estimation.ray_kernels import fuse_rays, is_sound, misfit
 from pipeline.estimation.relative_kernels import (
     BIASES,
     BODY,
@@ -35,7 +36,7 @@ from pipeline.estimation.sample_noise import SampleNoise
 from pipeline.estimation.told_motion import ToldTwist, ToldVertical
 from pipeline.estimation.tones import PHONE, ROBOT, Tones
 from pipeline.estimator_config import RelativeConfig
-from pipeline.frames import Array, cross, exp
+from pipeline.frames import Array, exp
 from pipeline.imu_stream import ImuStream
 from pipeline.robot import ToldMotion
 from pipeline.signals import BodyImu, Flags, StampOffset, VisionMeasurement
@@ -273,16 +274,13 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
 
         The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
         """
-        passing = np.eye(6, 7)
-        passing[:, 6] = self.passing(here)
-        P: Array = passing @ here.P[TOUCHED[:, None], TOUCHED] @ passing.T
+        P: Array = pose_in_picture(here.P, self.passing(here))
         return P
 
     def passing(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """(6,) how the pose passes there: ṗ in c [m/s], the attitude's rate in b [rad/s]."""
-        inputs, p = self._inputs(here), here.x[0:3]
-        u = here.x[3:6] + self.told_velocity(here)
-        return np.concatenate((u - cross(inputs[6:9], p), inputs[0:3] - here.R.T @ inputs[6:9]))
+        rate: Array = pose_rate(here.x, here.R, self._inputs(here), self._told_at(here))
+        return rate
 
     def told_velocity(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """(3,) in c [m/s] of a body that tells its own, which x has not; zeros of another."""
