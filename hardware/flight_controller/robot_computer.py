@@ -17,6 +17,7 @@ from hardware.robot_file import RobotFile, RobotFileError
 from pipeline.frames import triple
 
 MISSING = "missing: which motor is which thruster, and who stops the motors"
+MOTORS_ALONE = "not allowed beside [flight_controller]: it turns motors, and nothing else"
 
 
 class RobotComputer:
@@ -28,12 +29,15 @@ class RobotComputer:
         """Refusing thrust.
 
         Raises:
-            RobotFileError: the file has no [flight_controller].
+            RobotFileError: the file has no [flight_controller], or what that can't do.
         """
+        robot = robot_file.robot
         if robot_file.flight_controller is None:
-            raise RobotFileError(robot_file.robot.name, "flight_controller", MISSING)
+            raise RobotFileError(robot.name, "flight_controller", MISSING)
+        if robot.tool or robot.blinks:
+            raise RobotFileError(robot.name, "tool" if robot.tool else "blinks", MOTORS_ALONE)
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
-        self.flight_controller = Betaflight(robot_file.flight_controller, robot_file.robot.f_max)
+        self.flight_controller = Betaflight(robot_file.flight_controller, robot.f_max)
         self._nonces, self._health = nonces, HealthEnd(boot_id, key)
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:

@@ -237,6 +237,15 @@ def wired_table(**changes):
     return table
 
 
+@pytest.mark.parametrize(
+    ("has", "named"), [({"tool": "gripper"}, "tool"), ({"blinks": True}, "blinks")]
+)
+def test_what_a_flight_controller_does_not_do_is_refused_before_anybody_relies_on_it(has, named):
+    wired = replace(WIRED, robot=replace(WIRED.robot, **has))
+    with pytest.raises(RobotFileError, match=f"{named}: not allowed beside .flight_controller"):
+        RobotComputer(wired, 7, seeded_nonces(0), KEY)
+
+
 def test_a_robot_file_tells_how_it_is_wired():
     wiring = robot_of(wired_table(imu_axes=["y", "-x", "z"]), "f").flight_controller
     assert wiring.motors == tuple(range(1, 9))
