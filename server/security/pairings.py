@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import secrets
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from typing import Literal
 
 import msgspec
@@ -129,20 +129,26 @@ class Pairings:
             raise PairingError("token", f"a link lives {LINK_S / 60:g} minutes: scan a new code")
         return link
 
-    def pair(self, key: str, name: str, address: str, now: float) -> tuple[Member, str]:
+    def pair(
+        self, key: str, name: str, address: str, now: float, instead_of: str = ""
+    ) -> tuple[Member, str]:
         """Exchange a link's key for a session and the value of its cookie.
+
+        It may be `instead_of` the member with that id, whose place and name it takes: whoever pairs
+        anew is no other person.
 
         Raises:
             PairingError: never handed out, used, expired, or too many are here.
         """
         link, (_, waits) = self._link(key, now), self.opens(key, now)
-        if len(self.present()) >= MAX_MEMBERS:
+        others = [one for one in self.present() if one.id != instead_of]
+        if len(others) >= MAX_MEMBERS:
             raise PairingError("token", f"at most {MAX_MEMBERS} at a time: revoke somebody")
         link.used = True
         cookie = self._key()
         member = Member(
             id=self._key()[:8],
-            name=self._free_name(name),
+            name=_free_name(name, {one.name for one in others}),
             role=link.role,
             state="waiting" if waits else "in",
             code=self._free_code() if waits else "",
@@ -153,12 +159,6 @@ class Pairings:
         self.book.members[member.id] = member
         self._used[member.id] = now
         return member, cookie
-
-    def _free_name(self, name: str) -> str:
-        wanted = printable(name)[:MAX_NAME].strip() or "someone"
-        taken = {one.name for one in self.present()}
-        numbered = (f"{wanted} {n}" for n in range(2, MAX_MEMBERS + 2))
-        return wanted if wanted not in taken else next(n for n in numbered if n not in taken)
 
     def _free_code(self) -> str:
         taken = {one.code for one in self.present()}
@@ -241,6 +241,12 @@ class Pairings:
             del members[id]
             self._used.pop(id, None)
         return member
+
+
+def _free_name(name: str, taken: Container[str]) -> str:
+    wanted = printable(name)[:MAX_NAME].strip() or "someone"
+    numbered = (f"{wanted} {n}" for n in range(2, MAX_MEMBERS + 2))
+    return wanted if wanted not in taken else next(n for n in numbered if n not in taken)
 
 
 def digest_of(key: str) -> str:

@@ -119,7 +119,10 @@ class PeopleApi:
             role, must_wait = doors.pairings.opens(asked.token, doors.clock())
             if not asked.replace and former is not None and _loses(former, role, must_wait):
                 return _role_conflict(former, role, must_wait)
-            member, cookie = doors.pairings.pair(asked.token, asked.name, address, doors.clock())
+            instead_of = former.id if former is not None else ""
+            member, cookie = doors.pairings.pair(
+                asked.token, asked.name, address, doors.clock(), instead_of
+            )
         except PairingError as error:
             doors.tried(address)
             doors.audit.note("refusal", address=address, why=f"pairing: {error.allowed}")

@@ -137,6 +137,17 @@ def test_too_many_are_refused_and_links_take_bounded_room():
     assert len(pairings.book.links) == MAX_LINKS
 
 
+def test_whoever_pairs_anew_keeps_his_place_and_his_name():
+    pairings = Pairings()
+    first, *_ = [enter(pairings, name="Dora")[0] for _ in range(MAX_MEMBERS)]
+    key = pairings.invite("viewer", 0.0)
+    with pytest.raises(PairingError, match="at most"):
+        pairings.pair(key, "Dora", "192.0.2.1", 0.0, "nobody")
+    again, _ = pairings.pair(key, "Dora", "192.0.2.1", 0.0, first.id)
+    assert (again.name, again.state) == ("Dora", "in")
+    assert again.id != first.id
+
+
 def test_those_who_have_ended_take_bounded_room_and_the_newest_are_remembered():
     pairings = Pairings()
     for n in range(3 * MAX_ENDED):
