@@ -56,6 +56,8 @@ class PhoneOptions:
     picture_delay_s: tuple[float, float] = (0.060, 0.120)
     date_jitter_s: float = 0.0
     """Standard deviation of what a picture's date is off by, each by its own [s]."""
+    misdated_s: float = 0.0
+    """So much later than it is dated each picture is taken, and no calibration says so [s]."""
     sigma_omega: float = radians(0.03)
     """White noise of the gyroscope, one axis [rad/s]."""
     sigma_a: float = 0.006
@@ -261,7 +263,7 @@ class VirtualPhone:
         """
         jitter_s = self.options.date_jitter_s
         jitter = jitter_s * self._date_rng.standard_normal() if jitter_s > 0.0 else 0.0
-        return t - self.camera.extrinsics.time_offset_s + jitter
+        return t - self.camera.extrinsics.time_offset_s - self.options.misdated_s + jitter
 
     def relative_pose(self, t: float, body: BodyHistory) -> tuple[Array, Array]:
         """True (R_cb (3, 3), p_bc_in_c (3,) [m]) at `t` [s]."""

@@ -1,7 +1,8 @@
 """Display lag: how long after it is drawn a light leaves the glass, by a phone that films it.
 
 A light sweeps over the glass as a sine of the time at which it is drawn; pictures say where it was
-when they were taken. What their dates are wrong by is in the lag too, and is undone with it.
+when they were taken, by their dates: what these are wrong by is in the lag too. Where a glass that
+stands still tells by how much (`RobotOfLight.lag`), it is taken off again.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ It is the relative filter again, which leads robots: its body is the glass, at r
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,10 @@ from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import GRAVITY, Array
 from pipeline.glass.window import Glass
+from pipeline.imu_stream import ImuStreams
 from pipeline.signals import BodyImu, PhoneImu, StampOffset, VisionMeasurement
+from pipeline.timing.camera_imu_delay import CameraImuDelay
+from pipeline.timing.offset_watch import BESIDE_S
 
 AT_REST = RelativeConfig(
     sigma_omega_b=1e-4,
@@ -37,6 +40,9 @@ OLD_S = 0.3
 """An eye that rests on no picture newer than this is nobody's."""
 DATED_S = 1e-3
 """Standard deviation below which a time offset is told."""
+COARSE_S = 0.015
+"""A time offset beyond it is sought apart from the filter, which may be sure of none at all. Less
+the filter finds by itself, without the jump to what unknown lines of a shutter make of it."""
 UNSURE_M = 5e-3
 """Standard deviation beyond which an eye is nobody's."""
 
@@ -71,7 +77,8 @@ class EyeTracker:
 
     def __init__(self, glass: Glass) -> None:
         """Nothing is known of the phone."""
-        self._filter = RelativeFilter(AT_REST, glass.fiducials())
+        self._filter, self._imus = RelativeFilter(AT_REST, glass.fiducials()), ImuStreams()
+        self._stamps, self._is_misdated = CameraImuDelay(self._imus), False
         self._samples: deque[PhoneImu] = deque(maxlen=64)
         self._up_in_g, self._pictures = np.zeros(3), 0
 
@@ -87,6 +94,8 @@ class EyeTracker:
         """Take a motion sample: a sensor of the glass would measure gravity alone."""
         self._samples.append(sample)
         self._filter.add_phone_imu(sample)
+        self._imus.add(sample)
+        self._imus.add(BodyImu(sample.t, np.zeros(3), np.zeros(3)))
         up = self.up_in_g
         if up is not None:
             self._filter.add_body_imu(BodyImu(sample.t, np.zeros(3), GRAVITY * up))
@@ -99,13 +108,25 @@ class EyeTracker:
             share = 1.0 / min(self._pictures, REMEMBERED_PICTURES)
             specific_force_in_g = seen.pose.R_cb.T @ np.mean(near, axis=0)
             self._up_in_g += share * (specific_force_in_g - self._up_in_g)
+        if seen.pose is not None:
+            self._stamps.add_pose(seen.pose)
+        offset = self._stamps.offset
+        self._is_misdated |= offset is not None and abs(offset.value) > COARSE_S
+        if self._is_misdated:
+            seen = replace(seen, offset=offset)
         self._filter.add_seen(seen, now)
 
     @property
     def time_offset(self) -> StampOffset | None:
-        """Of the pictures' stamps, by a glass that stands still; None while it is not sure."""
-        offset = self._filter.time_offset
-        return offset if offset is not None and offset.sigma < DATED_S else None
+        """Of the pictures' stamps, by a glass that stands still; None while it is not sure.
+
+        A filter can be sure of a wrong one for seconds, and who was told it believes nothing else:
+        it is told once a search apart from it agrees.
+        """
+        offset, coarse = self._filter.time_offset, self._stamps.offset
+        if offset is None or coarse is None or offset.sigma > DATED_S:
+            return None
+        return offset if abs(offset.value - coarse.value) < BESIDE_S else None
 
     def at(self, now: float) -> Eye | None:
         """The eye at `now` [s], which does not go back; None while nothing is known."""

@@ -99,8 +99,8 @@ class RobotOfLight:
         self._tracker = LagTracker()
         self._lens: LensMeter | None = None
         """None: the lens is calibrated, or was measured."""
-        self.lag: DisplayLag | None = None
-        """Of the display, once it is measured; followed from then on."""
+        self.dated_lag: DisplayLag | None = None
+        """From drawing to a picture's date, once it is measured; followed from then on."""
         self._t_lag = -np.inf
         self.is_shown = False
         """To the camera in use, since its lag was fit."""
@@ -135,7 +135,23 @@ class RobotOfLight:
         views = self._views
         if views is None:
             return None
-        return GlassSeen(self.lag, self._t_lag, views, self._turns.held())
+        return GlassSeen(self.dated_lag, self._t_lag, views, self._turns.held())
+
+    @property
+    def lag(self) -> DisplayLag | None:
+        """Of the display; what dates are wrong by, as far as the glass knows it, is not in it.
+
+        Control dates pictures by that, too: both must, or the robot is drawn for another moment
+        than the one at which control believes to see it.
+        """
+        lag = self.dated_lag
+        return None if lag is None else DisplayLag(lag.value + self._misdated_s, lag.sigma)
+
+    @property
+    def _misdated_s(self) -> float:
+        """So much later than it is dated a picture was taken [s]."""
+        offset = self.time_offset
+        return 0.0 if offset is None else offset.value
 
     @property
     def time_offset(self) -> StampOffset | None:
@@ -165,11 +181,12 @@ class RobotOfLight:
             return
         R_gc = seen.pose.R_cb.T
         places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
-        if self.lag is None or not self._is_fit(self.lag):
+        lag = self.lag
+        if lag is None or self.dated_lag is None or not self._is_fit(lag):
             self._measure(seen.t, places)
         else:
             self._tracker.add_seen(seen.t, places[self.glass.has(places)])
-            self._follow(self.lag, seen.t)
+            self._follow(self.dated_lag, seen.t)
 
     def _is_fit(self, lag: DisplayLag) -> bool:
         """Whether it may be led by; one that no longer is, is measured from nothing."""
@@ -190,7 +207,7 @@ class RobotOfLight:
             self._meter.add_position(t, float(places[sweeps][0, 0]))
             found = self._meter.lag()
             if found is not None:
-                self.lag, self._t_lag, self._tracker = found, t, LagTracker()
+                self.dated_lag, self._t_lag, self._tracker = found, t, LagTracker()
 
     def _follow(self, lag: DisplayLag, t: float) -> None:
         """Correct a lag that the robot's own lights deny."""
@@ -199,7 +216,7 @@ class RobotOfLight:
             self._t_lag = t
         if error is not None and abs(error.value) > SURE * error.sigma:
             step = min(max(error.value, -CORRECTED_S), CORRECTED_S)
-            self.lag = DisplayLag(lag.value - step, error.sigma)
+            self.dated_lag = DisplayLag(lag.value - step, error.sigma)
             self._tracker.corrected(step)
 
     def step(self, now: float, robot: PathAhead) -> Lights:
@@ -213,20 +230,22 @@ class RobotOfLight:
             late_s = self._late_s
             is_late = late_s > OLD_S and eye is not None and eye.age < late_s + OLD_S
             return Lights("search", LATE.format(late_ms=1e3 * late_s) if is_late else LOOK)
-        if self.lag is None:
+        lag = self.lag
+        if lag is None:
             return Lights("sweep", self._misplaced(eye) or MEASURES)
-        if not self._is_fit(self.lag):
+        if not self._is_fit(lag):
             # measured on: another mode of the display, or clocks that are known by then, mend it
-            late_ms = 1e3 * self.lag.value
+            late_ms = 1e3 * lag.value
             return Lights("sweep", LAGS.format(late_ms=late_ms) if late_ms > 0.0 else LEADS)
         if self._lens is not None:
             return Lights("search", self._misplaced(eye) or TILT)
-        return self._shown(eye, up_in_g, now, robot)
+        return self._shown(eye, up_in_g, now, lag, robot)
 
-    def _shown(self, eye: Eye, up_in_g: Array, now: float, robot: PathAhead) -> Lights:
-        assert self.lag is not None
-        start, hanging = now + self.lag.value, Hanging.of(up_in_g, self._leds_in_b)
-        path = robot(max(self.lag.value, 0.0) + HORIZON_S)
+    def _shown(
+        self, eye: Eye, up_in_g: Array, now: float, lag: DisplayLag, robot: PathAhead
+    ) -> Lights:
+        start, hanging = now + lag.value, Hanging.of(up_in_g, self._leds_in_b)
+        path = robot(max(lag.value, 0.0) + HORIZON_S)
         times, wxyz, p = (np.array(part) for part in zip(*path, strict=True))
         places = np.empty((round(HORIZON_S / STEP_S) + 1, len(self._leds_in_b), 2))
         for k in range(len(places)):
@@ -234,7 +253,7 @@ class RobotOfLight:
             i = int(np.abs(times - t).argmin())  # of a path with a step of a few milliseconds
             leds_in_g = hanging.leds_in_g(R_from_wxyz(wxyz[i]), p[i], self._leds_in_b)
             places[k] = pierced(eye.at(t), leds_in_g)
-        self._tracker.add_drawn(start + DRAWN * STEP_S, places[DRAWN])
+        self._tracker.add_drawn(start + DRAWN * STEP_S - self._misdated_s, places[DRAWN])
         self.is_shown = True
         return Lights("robot", self._misplaced(eye), start, places)
 

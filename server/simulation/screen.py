@@ -71,7 +71,7 @@ class ScreenSimulation(VirtualTimeSimulation):
         self.robot_of_light = RobotOfLight(leds_in_b, display.glass)
         self._begin_camera(self._frame_pipeline.camera, is_guessed=not scene.knows_camera)
         if display.believed_lag_s is not None:
-            self.robot_of_light.lag = DisplayLag(display.believed_lag_s, 0.0)
+            self.robot_of_light.dated_lag = DisplayLag(display.believed_lag_s, 0.0)
         self._sent: deque[tuple[float, Lights]] = deque(maxlen=16)
         self._t_frame = 0.0
         self.phases: set[str] = set()

@@ -6,6 +6,7 @@ import pytest
 
 from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.hand import make_hand
+from hardware.sim.phone import PhoneOptions
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import TeleopConfig
 from server.control.process import teleop_config
@@ -77,6 +78,22 @@ def test_an_arm_is_led_as_a_robot_of_light(seed, rest_s):
     assert not figures.ended
     assert figures.rms_mm < 20.0
     assert figures.rms_deg < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("misdated_s", [0.04, 0.07, -0.03])
+def test_pictures_that_a_phone_dates_wrongly_are_dated_by_the_glass(misdated_s):
+    """Control and what is drawn go by the same dates, or the light is for another moment."""
+    sensors = PhoneOptions(misdated_s=misdated_s)
+    scene = SimulationOptions(hand="moving", seed=1000, sensors=sensors)
+    simulation = ScreenSimulation(SCREEN, CONFIG, scene, Display(lag_s=0.046))
+    figures = result_of(simulation.run(12.0), simulation.scene, 4.0)
+    light = simulation.robot_of_light
+    assert light.time_offset.value == pytest.approx(misdated_s, abs=0.002)
+    assert 0.044 < light.lag.value < 0.046 + 0.020  # a frame stays for 17 ms
+    assert light.dated_lag.value == pytest.approx(light.lag.value - misdated_s, abs=0.002)
+    assert not figures.ended
+    assert figures.rms_mm < 9.0
 
 
 @pytest.mark.slow

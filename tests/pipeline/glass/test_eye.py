@@ -100,8 +100,8 @@ def followed(seed, seconds=6.0, readout_s=0.0, late_s=0.0):
                 pixels = pixels + (pixels[:, 1:] / CAMERA.height - 0.5) * readout_s * speed
             noisy = pixels + 0.15 * rng.standard_normal(pixels.shape)
             seen = glass_seen(CAMERA, GLASS, np.arange(16), noisy, t + late_s)
-            eye.add_seen(seen, t + 0.02)
-        now = t + 0.02
+            eye.add_seen(seen, t + max(0.02, late_s))
+        now = t + max(0.02, late_s)
         found = eye.at(now)
         if found is not None and t > 3.0:
             ahead = now + 0.03
@@ -121,13 +121,24 @@ def test_the_eye_is_smooth_and_ahead_of_its_pictures(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("late_s", [-0.012, 0.0, 0.012])
-def test_a_glass_that_stands_still_tells_when_its_pictures_were_taken(late_s):
-    _, eye = followed(1000, late_s=late_s)
+@pytest.mark.parametrize(
+    ("late_s", "seconds"), [(-0.012, 6.0), (0.0, 6.0), (0.012, 6.0), (-0.05, 8.0), (0.03, 8.0)]
+)
+def test_a_glass_that_stands_still_tells_when_its_pictures_were_taken(late_s, seconds):
+    _, eye = followed(1000, seconds=seconds, late_s=late_s)
     offset = eye.time_offset
     assert offset is not None
     assert abs(offset.value + late_s) < 1e-3
     assert abs(offset.value + late_s) < 4.0 * offset.sigma
+
+
+@pytest.mark.slow
+def test_a_filter_that_is_sure_of_a_wrong_time_is_not_believed_alone():
+    _, eye = followed(1000, seconds=3.4, late_s=-0.05)
+    learnt = eye._filter.time_offset
+    assert learnt.sigma < 1e-3
+    assert abs(learnt.value - 0.05) > 0.04
+    assert eye.time_offset is None
 
 
 def test_nobody_knows_when_pictures_were_taken_before_the_first_of_them():

@@ -150,9 +150,9 @@ def test_a_lag_that_is_corrected_beyond_what_is_fit_is_borne_a_little_by_who_lea
         (3.7, MOST_LAG_S + 0.8 * BORNE_S, "sweep"),
         (3.8, MOST_LAG_S - 0.001, "robot"),
     ):
-        robot.lag = DisplayLag(lag_s, 0.001)
+        robot.dated_lag = DisplayLag(lag_s, 0.001)
         assert filmed(thread, 0.1, 0.075, since=since).phase == phase
-    robot.lag = DisplayLag(MOST_LAG_S + 0.8 * BORNE_S, 0.001)
+    robot.dated_lag = DisplayLag(MOST_LAG_S + 0.8 * BORNE_S, 0.001)
     thread.add(NewCamera(CAMERA, is_guessed=False))
     assert filmed(thread, 1.0, 0.075, since=3.9).phase == "sweep"
 
