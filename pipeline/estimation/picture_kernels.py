@@ -27,8 +27,8 @@ def put_corrections(
 ) -> float:
     """What a picture corrects of the four sensors' biases, and by how much it lowers their doubt.
 
-    Into `shift` (4, 3), cut to that of a χ² of `most`, and
-    `reduction` (4, 3, 3). Gives χ² by its six degrees; inf without such S.
+    Into `shift` (4, 3), cut to that of a χ² of `most`, and `reduction` (4, 3, 3). Gives χ² by its
+    six degrees; inf without such S.
     """
     L, x, gain = S.copy(), e.copy(), np.empty(POSE)
     if not cholesky(L, 0.0):
