@@ -5,7 +5,6 @@ It is the relative filter again, which leads robots: its body is the glass, at r
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -79,7 +78,6 @@ class EyeTracker:
         """Nothing is known of the phone."""
         self._filter, self._imus = RelativeFilter(AT_REST, glass.fiducials()), ImuStreams()
         self._stamps, self._is_misdated = CameraImuDelay(self._imus), False
-        self._samples: deque[PhoneImu] = deque(maxlen=64)
         self._up_in_g, self._pictures = np.zeros(3), 0
 
     @property
@@ -92,7 +90,6 @@ class EyeTracker:
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Take a motion sample: a sensor of the glass would measure gravity alone."""
-        self._samples.append(sample)
         self._filter.add_phone_imu(sample)
         self._imus.add(sample)
         self._imus.add(BodyImu(sample.t, np.zeros(3), np.zeros(3)))
@@ -102,8 +99,9 @@ class EyeTracker:
 
     def add_seen(self, seen: VisionMeasurement, now: float) -> None:
         """Take what a picture says of the glass, at `now` [s]."""
-        near = [s.a_m_cf_in_c for s in self._samples if abs(s.t - seen.t) < AVERAGED_S]
-        if seen.pose is not None and near:
+        phone = self._imus.phone
+        near = phone.values[np.abs(phone.times - seen.t) < AVERAGED_S, 3:6]
+        if seen.pose is not None and len(near):
             self._pictures += 1
             share = 1.0 / min(self._pictures, REMEMBERED_PICTURES)
             specific_force_in_g = seen.pose.R_cb.T @ np.mean(near, axis=0)
