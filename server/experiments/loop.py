@@ -31,7 +31,7 @@ Hidden = tuple[float, float, tuple[int, ...]]
 
 RECORDED = ("filming", "before_target")
 """Hands as people's move; what `steady` and `moving` are shaken by is no hand's tremor."""
-VIRTUAL = ("date-jitter-ms", "led-error-mm", "hide", "out")
+VIRTUAL = ("misdated-ms", "date-jitter-ms", "led-error-mm", "hide", "out")
 """Options of virtual time alone."""
 HEADINGS = (
     ("around", "around", "{:<15}"),
@@ -96,6 +96,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     sensors = PhoneOptions(
         frame_rate_hz=arguments.fps,
         picture_delay_s=latency_s,
+        misdated_s=1e-3 * arguments.misdated_ms,
         date_jitter_s=1e-3 * arguments.date_jitter_ms,
     )
     scene = SimulationOptions(
@@ -110,6 +111,11 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
         f"{arguments.robot}, gains {arguments.gains}, estimator {estimator}, virtual camera "
         f"{cutoff_hz(config.virtual_camera):.2f} Hz, {scene.width}x{scene.height} at "
         f"{scene.frame_rate_hz:g} fps through {scene.codec}, {low:g}-{high:g} ms late"
+        + (
+            f", taken {arguments.misdated_ms:g} ms after their dates"
+            if arguments.misdated_ms
+            else ""
+        )
         + (f", dates ± {arguments.date_jitter_ms:g} ms" if arguments.date_jitter_ms else "")
         + (f", LEDs ± {arguments.led_error_mm:g} mm" if arguments.led_error_mm else "")
     )
@@ -198,6 +204,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=seed_number, default=1)
     parser.add_argument("--latency-ms", nargs=2, type=number(0.0, 400.0), default=(60.0, 120.0))
     parser.add_argument("--fps", type=number(1.0, 1000.0), default=30.0)
+    parser.add_argument(
+        "--misdated-ms",
+        type=number(-120.0, 120.0),
+        default=0.0,
+        help="how much later than it is dated each picture is taken, which nobody is told",
+    )
     parser.add_argument(
         "--date-jitter-ms",
         type=number(0.0, 30.0),

@@ -55,9 +55,20 @@ def test_what_can_t_be_had_live_is_refused_before_a_server_starts(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(live_loop, "server")
-    words = ["--live", "--date-jitter-ms", "4", "--led-error-mm", "1", "--hide", "2", "3"]
+    words = [
+        "--live",
+        "--misdated-ms",
+        "-30",
+        "--date-jitter-ms",
+        "4",
+        "--led-error-mm",
+        "1",
+        "--hide",
+        "2",
+        "3",
+    ]
     assert main(["loop", "--hands", "still", *words]) == 2
-    said = "--date-jitter-ms, --led-error-mm, --hide: not with --live\n"
+    said = "--misdated-ms, --date-jitter-ms, --led-error-mm, --hide: not with --live\n"
     assert capsys.readouterr().err == f"lightleash experiments loop: {said}"
 
 
