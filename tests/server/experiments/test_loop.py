@@ -10,6 +10,8 @@ import pytest
 
 from hardware.sim.measured_hands import MEASURED
 from server.experiments import loop, main
+from server.experiments.runner import RefusedError
+from server.simulation.virtual_time import SimulationOptions
 from server.virtual_phone import live_loop
 from server.virtual_phone.command import make_parser
 from tests.bench.blocks import PAGES
@@ -70,6 +72,23 @@ def test_what_can_t_be_had_live_is_refused_before_a_server_starts(
     assert main(["loop", "--hands", "still", *words]) == 2
     said = "--misdated-ms, --date-jitter-ms, --led-error-mm, --hide: not with --live\n"
     assert capsys.readouterr().err == f"lightleash experiments loop: {said}"
+
+
+def test_a_phone_dates_its_pictures_as_wrongly_as_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[SimulationOptions] = []
+
+    def fly(_robot_file: object, _config: object, scene: SimulationOptions) -> None:
+        asked.append(scene)
+        raise RefusedError("asked, not flown")
+
+    monkeypatch.setattr(loop, "VirtualTimeSimulation", fly)
+    words = ["--misdated-ms", "-30", "--date-jitter-ms", "4"]
+    assert main(["loop", "--hands", "still", *words]) != 0
+    sensors = asked[0].sensors
+    assert sensors is not None
+    assert (sensors.misdated_s, sensors.date_jitter_s) == pytest.approx((-0.03, 0.004))
 
 
 def test_a_live_phone_is_as_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
