@@ -16,6 +16,7 @@ from pipeline.estimation.estimator import Estimator
 from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimation.picture_kernels import pose_in_picture
+from pipeline.estimation.ray_kernels import correct
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.frames import GRAVITY, Array
 from pipeline.robot import ToldMotion
@@ -65,6 +66,7 @@ def warm_up() -> None:
     BiasSteps(np.ones(4)).learn(0.0, e, C, P)
     DateNoise().learn(e, C, e)
     AdaptiveNoise().judge(e, pose_in_picture(P, e), C)
+    correct(np.zeros(19), np.eye(3), np.zeros(22))  # a start that is carried on
     check = AccelerometerCheck()
     for t in (0.0, 0.01):
         check.add(t, still, up)

@@ -28,6 +28,7 @@ from pipeline.estimation.relative_start import (
     can_start,
     first_checkpoint,
     is_better_start,
+    is_carried_by,
 )
 from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_imu_sample
@@ -161,7 +162,9 @@ class RelativeFilter:
         # gating in this order: a prediction too unsure to gate by is replaced, not corrected; then
         # what the sensors may be off by inflates it, before each LED is gated against it
         predicted = self._track.predicted(min(t, now))
-        if is_better_start(seen, predicted.P, self._config) and self._start(seen, now):
+        if is_better_start(seen, predicted.P, self._config) and (
+            self._carry_on(seen, predicted) or self._start(seen, now)
+        ):
             return Fusion.STARTED
         return self._fuse(seen, predicted, now)
 
@@ -263,6 +266,17 @@ class RelativeFilter:
         self._t_seen = self._t_start = seen.t
         self._recent.append(seen.t)
         return Fusion.STARTED
+
+    def _carry_on(self, seen: VisionMeasurement, predicted: Checkpoint[VisionMeasurement]) -> bool:
+        """Begin at the picture's own pose with all else that is known, how it moves too."""
+        assert seen.pose is not None
+        e, P = _missed(seen.pose, predicted), self._track.in_picture(predicted)
+        if not is_carried_by(seen, predicted, e, P, self._config):
+            return False
+        self._track.begin(predicted)
+        self._misses, self._t_seen = 0, max(self._t_seen, seen.t)
+        self._recent.append(seen.t)
+        return True
 
     def _keep_learnt(self, t: float) -> None:
         if abs(t - self._t_start) < FRESH_S:

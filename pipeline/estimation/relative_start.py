@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.estimation.out_of_sequence import Checkpoint
+from pipeline.estimation.ray_kernels import correct
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET, N, X
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
@@ -17,6 +18,8 @@ from pipeline.so3_kernels import largest_sigma
 LOST: Final = 0.1
 """Doubt of the place, by its distance, or of the attitude [rad], beyond which a picture's own pose
 is the better start: what the LEDs say of an error so large isn't linear in it."""
+SAME: Final = 22.5
+"""99.9 % of χ² with 6 degrees of freedom: a pose farther off is not of what was predicted."""
 Learnt = tuple[Array, Array]
 """Biases and time offset (13,), and their covariance (13, 13)."""
 
@@ -39,6 +42,41 @@ def is_better_start(seen: VisionMeasurement, P: Array, config: RelativeConfig) -
         largest_sigma(P, k) > max(enough, worse * largest_sigma(C, k))
         for k, enough in ((0, near), (3, LOST))
     )
+
+
+def is_carried_by(
+    seen: VisionMeasurement,
+    here: Checkpoint[VisionMeasurement],
+    e: Array,
+    P: Array,
+    config: RelativeConfig,
+) -> bool:
+    """Correct what was predicted for a picture by the pose that it gives by itself.
+
+    What LEDs say of an error so large isn't linear in it, a pose is, and two of them tell how it
+    moves from the one to the other: pictures too far apart for their LEDs would else all be starts.
+    Nothing is learnt of the pictures' dates.
+
+    Args:
+        seen: The picture, with its pose.
+        here: What was predicted for it; corrected.
+        e: (6,) by how much the pose is off that: δp in c [m], θ in b [rad].
+        P: (6, 6) covariance of e as predicted, what the date is doubted by in it.
+        config: How far starts are doubted.
+
+    Returns:
+        False: it can't be of what was predicted, which is left as it is.
+    """
+    assert seen.pose is not None
+    S = P + config.start_doubt**2 * seen.pose.covariance
+    if not e @ np.linalg.solve(S, e) < SAME:
+        return False
+    K: Array = np.ascontiguousarray(np.linalg.solve(S, here.P[: len(e)]).T)
+    K[OFFSET] = 0.0
+    known = here.P[: len(e)].copy()
+    correct(here.x, here.R, K @ e)
+    here.P += K @ S @ K.T - K @ known - (K @ known).T
+    return True
 
 
 def first_checkpoint(

@@ -38,6 +38,18 @@ def test_a_phone_before_a_screen_measures_its_lag_and_leads_the_robot_of_light()
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("pictures_hz", "late_s"), [(5.0, (0.06, 0.10)), (7.0, (0.15, 0.25))])
+def test_few_and_late_pictures_lead_a_robot_of_light(pictures_hz, late_s):
+    hand = make_hand("moving", seed=1000, start=SCREEN.start, rest_s=8.0)
+    scene = SimulationOptions(hand="moving", seed=1000, frame_rate_hz=pictures_hz, latency_s=late_s)
+    simulation = ScreenSimulation(SCREEN, CONFIG, scene, Display(), hand=hand)
+    figures = result_of(simulation.run(17.0), simulation.scene, 0.0)
+    assert figures.tracked_s > 5.0
+    assert not figures.ended
+    assert figures.rms_mm < 8.0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("distance_m", [0.8, 1.2])
 def test_from_wherever_the_glass_is_seen_its_lag_is_measured_in_three_seconds(distance_m):
     """From farther away the fiducials seem brighter than the light that sweeps."""
