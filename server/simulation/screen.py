@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from itertools import cycle
 from math import radians
 
 import numpy as np
@@ -28,7 +29,7 @@ from server.virtual_phone.phone_script import VirtualOperator
 
 INCHES_24 = Glass(0.53, 0.30)
 FRAMES_HZ = 60.0
-"""Of the display."""
+"""Of the display, and of the server's words to it."""
 WAY_S = 0.010
 """From the server to the page."""
 
@@ -46,6 +47,8 @@ class Display:
     """Taken for its lag without measuring; None: it is measured."""
     grey: int = 70
     """Of the fiducials in a picture, of 255; 0: there are none."""
+    frames_s: tuple[float, ...] = (1.0 / FRAMES_HZ,)
+    """From each frame to the next, in turn, again and again."""
 
 
 class ScreenSimulation(VirtualTimeSimulation):
@@ -73,7 +76,8 @@ class ScreenSimulation(VirtualTimeSimulation):
         if display.believed_lag_s is not None:
             self.robot_of_light.dated_lag = DisplayLag(display.believed_lag_s, 0.0)
         self._sent: deque[tuple[float, Lights]] = deque(maxlen=16)
-        self._t_frame = 0.0
+        self._t_lights = self._t_frame = 0.0
+        self._frames_s = cycle(display.frames_s)
         self.phases: set[str] = set()
         """Shown so far."""
         self.drawn_before_s: list[float] = []
@@ -86,10 +90,12 @@ class ScreenSimulation(VirtualTimeSimulation):
 
     def advance(self) -> Output:
         """One control period of everything, and the frames of the glass that are due."""
+        while self._t_lights <= self.t:
+            self._sent.append((self._t_lights + WAY_S, self._lights(self._t_lights)))
+            self._t_lights += 1.0 / FRAMES_HZ
         while self._t_frame <= self.t:
-            self._sent.append((self._t_frame + WAY_S, self._lights(self._t_frame)))
             self._shown.append((self._t_frame + self._display.lag_s, self._drawn()))
-            self._t_frame += 1.0 / FRAMES_HZ
+            self._t_frame += next(self._frames_s)
         return super().advance()
 
     def _lights(self, t: float) -> Lights:

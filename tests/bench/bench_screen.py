@@ -12,29 +12,18 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from hardware.robot_file import COMMANDS, load_robot
-from hardware.sim.hand import make_hand
-from pipeline.config import PERIOD_S, TeleopConfig
 from server.common.options import Parser
 from server.common.ranges import number, seed_number
 from server.common.text import Column, dashed
-from server.control.process import teleop_config
-from server.simulation.figures import rms, rows_of
-from server.simulation.screen import Display, ScreenSimulation
-from server.simulation.virtual_time import SimulationOptions
 from tests.e2e.conftest import wanted_chromium
-from tests.e2e.drawn_glass import GLASS, LAG_S, TILT_RAD
-from tests.e2e.screen_rig import PICTURES_HZ, REST_S, lead
+from tests.e2e.screen_alike import in_virtual_time
+from tests.e2e.screen_rig import lead
 
 HANDS: Final = {"screen": "moving", "so101": "filming"}
-BEFORE_S: Final = 12.0
-"""Until it is led in virtual time, at most."""
 COLUMNS: Final[tuple[Column, ...]] = (
     ("robot", "robot", "{}"),
     ("hand", "hand", "{}"),
@@ -42,7 +31,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
     ("rms_mm", "RMS mm", "{:.2f}"),
     ("virtual_mm", "virtual time mm", "{:.2f}"),
     ("ratio", "ratio", "{:.2f}"),
-    ("alike_mm", "with pictures as late and few mm", "{:.2f}"),
+    ("alike_mm", "by its pictures and frames mm", "{:.2f}"),
     ("frames_hz", "frames Hz", "{:.1f}"),
     ("pictures_hz", "pictures Hz", "{:.1f}"),
     ("late_ms", "late ms", "{}"),
@@ -61,27 +50,10 @@ class Row:
     """The same hand's, in virtual time."""
     ratio: float
     alike_mm: float
-    """In virtual time with as many pictures a second, as late on their way, as in this flight."""
+    """In virtual time by this flight's pictures and its page's frames, each as late as here."""
     frames_hz: float
     pictures_hz: float
     late_ms: str
-
-
-def in_virtual_time(
-    robot: str, hand: str, seed: int, seconds: float, pictures: SimulationOptions
-) -> float:
-    """RMS error [mm] since the press, by a phone whose `pictures` come so often and so late."""
-    robot_file = load_robot(robot, takes=COMMANDS)
-    camera = TeleopConfig().virtual_camera
-    config = teleop_config(robot_file, "phone", camera, "relative")
-    scene = replace(pictures, hand=hand, seed=seed)
-    held = make_hand(hand, seed=seed, start=robot_file.start, rest_s=REST_S)
-    display = Display(GLASS, LAG_S, TILT_RAD)
-    simulation = ScreenSimulation(robot_file, config, scene, display, hand=held)
-    trace = simulation.trace
-    while simulation.t < BEFORE_S + seconds and len(trace.t) * PERIOD_S < seconds:
-        simulation.advance()
-    return 1e3 * rms(np.linalg.norm(rows_of(trace.error_in_f), axis=1))
 
 
 def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
@@ -89,9 +61,7 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
     hand = HANDS[robot]
     with tempfile.TemporaryDirectory() as folder:
         flown = lead(chromium, Path(folder), robot, hand, seed, seconds)
-    usual = SimulationOptions(frame_rate_hz=PICTURES_HZ)
-    alike = replace(usual, frame_rate_hz=flown.pictures_hz, latency_s=flown.late_s)
-    virtual_mm = in_virtual_time(robot, hand, seed, seconds, usual)
+    virtual_mm = in_virtual_time(robot, hand, seed, seconds)
     return Row(
         robot=robot,
         hand=hand,
@@ -99,7 +69,7 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
         rms_mm=flown.rms_mm,
         virtual_mm=virtual_mm,
         ratio=flown.rms_mm / virtual_mm,
-        alike_mm=in_virtual_time(robot, hand, seed, seconds, alike),
+        alike_mm=in_virtual_time(robot, hand, seed, seconds, flown),
         frames_hz=flown.frames_hz,
         pictures_hz=flown.pictures_hz,
         late_ms="-".join(f"{1e3 * late_s:.0f}" for late_s in flown.late_s),

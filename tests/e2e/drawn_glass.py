@@ -64,6 +64,8 @@ class DrawnGlass:
         """Its middle is at `rest_in_f` (3,) [m]; the page is let in, and fills it."""
         self._hand, self._rest_in_f = hand, rest_in_f
         self._frames: deque[tuple[float, Array]] = deque(maxlen=KEPT)
+        self.drawn: list[float] = []
+        """When it drew each frame [s]."""
         self._behind_s = time.time() - clock.now()
         self.page: Page = context.new_page()
         self.page.add_init_script(TELL_FRAMES % MM)
@@ -105,4 +107,5 @@ class DrawnGlass:
                     ms, px, dots = json.loads(event["params"]["payload"])
                     middle, px_m = 0.5 * np.array(px), px[0] / GLASS.width_m
                     right_low = (np.reshape(dots, (-1, 2)) - middle) / px_m
-                    self._frames.append((1e-3 * ms - self._behind_s, right_low * (1.0, -1.0)))
+                    self.drawn.append(1e-3 * ms - self._behind_s)
+                    self._frames.append((self.drawn[-1], right_low * (1.0, -1.0)))

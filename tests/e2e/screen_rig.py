@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -20,9 +20,11 @@ from pipeline.signals import Image
 from server.common import clock
 from server.common.access import Access
 from server.common.child import PROMPT_PRIORITY, be_ordinary
-from server.protocol.messages import Status
+from server.protocol.messages import Status, Welcome
+from server.protocol.wire_records import Picture, Record
 from server.virtual_phone.command import make_parser, make_script
 from server.virtual_phone.live_phone import LivePhone
+from server.virtual_phone.phone_client import PhoneClient
 from tests.e2e.chromium_phone import browser
 from tests.e2e.drawn_glass import SIZE, DrawnGlass
 from tests.e2e.serving import serving
@@ -49,8 +51,30 @@ class ScreenFlown:
     late_s: tuple[float, float]
     """Of four in five pictures, from the capture to the arrival: the phone's own drawing is in it.
     """
+    pictures: tuple[tuple[float, float], ...] = field(repr=False)
+    """When each was taken, and when it was sent [s]."""
+    frames: tuple[float, ...] = field(repr=False)
+    """When the page drew each [s]."""
     said: tuple[str, ...]
     """By the server, in turn: its mode, and why, or why it can't be armed yet."""
+
+
+class DatedClient(PhoneClient):
+    """Remembers when it sent pictures."""
+
+    sent: list[float]
+    """[s]."""
+
+    async def open(self, device: str) -> Welcome:
+        """See `PhoneClient`."""
+        self.sent = []
+        return await super().open(device)
+
+    async def send(self, record: Record) -> None:
+        """See `PhoneClient`."""
+        await super().send(record)
+        if isinstance(record.body, Picture):
+            self.sent.append(clock.now())
 
 
 def lead(
@@ -68,7 +92,8 @@ def lead(
         told = make_parser().parse_args([f"--{name}={value}" for name, value in options.items()])
         script = make_script(told, robot_file, server.truth_port)
         glass = DrawnGlass(context, server, script.phone.hand, leds_in_b.mean(axis=0))
-        script.phone.films = partial(_drawn_beside, glass)
+        taken: list[float] = []
+        script.phone.films = partial(_drawn_beside, glass, taken)
         access = Access(server.http_url, server.operator_token, server.truth_port, robot)
         said: list[str] = []
         frames_hz: list[float] = []
@@ -86,7 +111,7 @@ def lead(
 
         async def fly() -> LivePhone:
             _go_before_browsers()
-            live = LivePhone(access, script, server.truth_port, axes)
+            live = LivePhone(access, script, server.truth_port, axes, DatedClient)
             await live.run(BEFORE_S + seconds, report)
             return live
 
@@ -97,12 +122,15 @@ def lead(
                 glass.page.wait_for_timeout(200.0)
         took_s, live = clock.now() - began, flown.result()
         glass.close()
+        assert isinstance(live.client, DatedClient)
         return ScreenFlown(
             tracked_s=live.score.tracked_s,
             rms_mm=1e3 * live.score.rms_m,
             frames_hz=float(np.median(frames_hz)),
             pictures_hz=live.sent / took_s,
             late_s=_span(late_ms),
+            pictures=tuple(zip(taken, live.client.sent, strict=False)),  # the last is on its way
+            frames=tuple(glass.drawn),
             said=tuple(said),
         )
 
@@ -118,10 +146,16 @@ def _go_before_browsers() -> None:
 
 
 def _drawn_beside(
-    glass: DrawnGlass, camera: Camera, t: float, robot: BodyHistory, rng: np.random.Generator
+    glass: DrawnGlass,
+    taken: list[float],
+    camera: Camera,
+    t: float,
+    robot: BodyHistory,
+    rng: np.random.Generator,
 ) -> Image:
     """Film when a browser leaves time: no phone draws what it films; it comes late and seldom."""
     be_ordinary()
+    taken.append(t)
     return glass.film(camera, t, robot, rng)
 
 
