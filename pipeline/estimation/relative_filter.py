@@ -270,10 +270,10 @@ class RelativeFilter:
     def _carry_on(self, seen: VisionMeasurement, predicted: Checkpoint[VisionMeasurement]) -> bool:
         """Begin at the picture's own pose with all else that is known, how it moves too."""
         assert seen.pose is not None
-        e, P = _missed(seen.pose, predicted), self._track.in_picture(predicted)
-        if not is_carried_by(seen, predicted, e, P, self._config):
+        e, passing = _missed(seen.pose, predicted), self._track.passing(predicted)
+        if not is_carried_by(seen, predicted, e, passing, self._config):
             return False
-        self._track.begin(predicted)
+        self._track.carry_on(predicted)
         self._misses, self._t_seen = 0, max(self._t_seen, seen.t)
         self._recent.append(seen.t)
         return True

@@ -48,7 +48,7 @@ def is_carried_by(
     seen: VisionMeasurement,
     here: Checkpoint[VisionMeasurement],
     e: Array,
-    P: Array,
+    passing: Array,
     config: RelativeConfig,
 ) -> bool:
     """Correct what was predicted for a picture by the pose that it gives by itself.
@@ -61,21 +61,22 @@ def is_carried_by(
         seen: The picture, with its pose.
         here: What was predicted for it; corrected.
         e: (6,) by how much the pose is off that: δp in c [m], θ in b [rad].
-        P: (6, 6) covariance of e as predicted, what the date is doubted by in it.
+        passing: (6,) how the pose passes there, which a wrong date is seen as.
         config: How far starts are doubted.
 
     Returns:
         False: it can't be of what was predicted, which is left as it is.
     """
     assert seen.pose is not None
-    S = P + config.start_doubt**2 * seen.pose.covariance
+    seen_P = here.P[: len(e)] + np.outer(passing, here.P[OFFSET])
+    S = seen_P[:, : len(e)] + np.outer(seen_P[:, OFFSET], passing)
+    S += config.start_doubt**2 * seen.pose.covariance
     if not e @ np.linalg.solve(S, e) < SAME:
         return False
-    K: Array = np.ascontiguousarray(np.linalg.solve(S, here.P[: len(e)]).T)
+    K: Array = np.ascontiguousarray(np.linalg.solve(S, seen_P).T)
     K[OFFSET] = 0.0
-    known = here.P[: len(e)].copy()
     correct(here.x, here.R, K @ e)
-    here.P += K @ S @ K.T - K @ known - (K @ known).T
+    here.P += K @ S @ K.T - K @ seen_P - (K @ seen_P).T
     return True
 
 

@@ -186,7 +186,11 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """See `OutOfSequence`; a tone goes on, and a vertical that was not known is learnt."""
         if self._vertical is not None:
             self._vertical.learn(start.t, start.R, self.phone, self.body)
-        super().begin(self._with_tone(start) if len(start.x) < self._sizes[0] else start)
+        super().begin(self._with_tone(start) if self.tone is not None else start)
+
+    def carry_on(self, here: Checkpoint[VisionMeasurement]) -> None:
+        """Begin at what was predicted there, corrected since, with all that it is."""
+        super().begin(here)
 
     def sway(self, tone: Tone | None) -> None:
         """Let the robot's samples have this tone since the base, or none."""
