@@ -35,9 +35,8 @@ REMEMBERED_PICTURES = 300
 """... and over so many it is learnt: ten seconds."""
 AVERAGED_S = 0.1
 """Over which the phone's accelerometer is averaged."""
-OLD_S = 0.5
-"""An eye that rests on no picture newer than this is nobody's. Its own doubt is larger sooner where
-motion samples are missing; by pictures that come seldom and late, the light would else flicker."""
+OLD_S = 0.3
+"""An eye that rests on no picture newer than this is nobody's."""
 DATED_S = 1e-3
 """Standard deviation below which a time offset is told."""
 COARSE_S = 0.015
