@@ -159,8 +159,8 @@ class RelativeFilter:
             self._track.walk(self._bias_steps.walks)
             self._track.doubt_phone(1.0)
         self._track.sway(self._aliased.tone)
-        # gating in this order: a prediction too unsure to gate by is replaced, not corrected; then
-        # what the sensors may be off by inflates it, before each LED is gated against it
+        # gating in this order: a prediction too unsure to gate by is corrected by the pose, or
+        # replaced; then what the sensors may be off by inflates it, before each LED is gated by it
         predicted = self._track.predicted(min(t, now))
         if is_better_start(seen, predicted.P, self._config) and (
             self._carry_on(seen, predicted) or self._start(seen, now)
