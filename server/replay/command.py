@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import sys
+from collections import deque
 from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -77,7 +78,7 @@ class Played:
 
     records: int = 0
     pictures_dropped: int = 0
-    """For want of credit, and those that can't be decoded without them."""
+    """They waited for credit until a key, or the end, made them needless."""
     late_s: float = 0.0
     """Largest lateness against the recorded timing."""
     modes: dict[str, int] = field(default_factory=dict)
@@ -115,19 +116,32 @@ async def play(recording: Recording, access: Access, speed: float) -> Played:
 
 
 async def _send(replay: Replay, client: PhoneClient, played: Played) -> None:
+    """Send what is due; a picture without credit waits, for it is encoded already.
+
+    A page would make none, and encode its next one by the last that was sent.
+    """
     while replay.pings < SYNCHRONISED_PONGS:
         await asyncio.sleep(0.02)
-    decodable = True
+    waiting: deque[tuple[float, Record]] = deque()
     for t_due, recorded in replay.due(now()):
         await asyncio.sleep(max(0.0, t_due - now()))
-        played.late_s = max(played.late_s, now() - t_due)
-        if isinstance(recorded.record.body, Picture):
-            decodable = client.has_credit and (decodable or recorded.record.body.key)
-            if not decodable:
-                played.pictures_dropped += 1
-                continue
-        await client.send(replay.retimed(t_due, recorded))
-        played.records += 1
+        record = replay.retimed(t_due, recorded)
+        if isinstance(record.body, Picture):
+            if record.body.key:  # decoded without those before it
+                played.pictures_dropped += len(waiting)
+                waiting.clear()
+            waiting.append((t_due, record))
+        else:
+            await _send_one(t_due, record, client, played)
+        while waiting and client.has_credit:
+            await _send_one(*waiting.popleft(), client, played)
+    played.pictures_dropped += len(waiting)
+
+
+async def _send_one(t_due: float, record: Record, client: PhoneClient, played: Played) -> None:
+    await client.send(record)
+    played.records += 1
+    played.late_s = max(played.late_s, now() - t_due)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -14,7 +14,7 @@ from pipeline.signals import PhoneImu, TouchState
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import encode_message
 from server.protocol.wire import decode, encode
-from server.protocol.wire_records import Motion, Ping, Pong, Record, Touch
+from server.protocol.wire_records import Credit, Motion, Picture, Ping, Pong, Record, Touch
 from server.recording.folder import RecordingFolder
 from server.recording.reader import Recording, device_of, read
 from server.recording.writer import PHONE_RECORDS, STATUS, Recorder, RecordingError
@@ -28,6 +28,7 @@ from tests.server.export.recordings import TWIST_IN_B, told_a_twist
 from tests.server.page_server import WELCOME, PageServer, status
 
 FLIGHT = Path(__file__).parents[2] / "data" / "virtual_phone.mcap"
+ONE_KEY = FLIGHT.with_name("chromium.mcap")
 AT_REST = Motion((0.0, 0.0, 0.0), (9.8, 0.0, 0.0), None, 90)
 
 
@@ -243,3 +244,41 @@ def test_replay_over_real_sockets_sends_the_stream_in_order(flight):
     motions = [b for b in bodies if isinstance(b, Motion)]
     assert motions == [r.record.body for r in recorded if isinstance(r.record.body, Motion)]
     assert {b.nonce for b in bodies if isinstance(b, Touch)} == {109}
+
+
+class BusyServer(ReplayServer):
+    """Gives no credit at first, as long as some pictures of the recording take to come due."""
+
+    BUSY_S = 0.3
+
+    async def __call__(self, socket):
+        if socket.request.path == "/ws/video":
+            self.credit, self.video = False, socket
+        await super().__call__(socket)
+
+    def pictures(self):
+        return [decode(data) for path, data in self.heard if path == "/ws/video"]
+
+    async def answer(self):
+        while not self.pictures():
+            await asyncio.sleep(0.02)
+        await asyncio.sleep(self.BUSY_S)
+        self.credit = True
+        await self.video.send(encode(Record(1, 1, Credit(self.pictures()[-1].sequence))))
+
+
+@pytest.mark.e2e
+def test_a_picture_waits_for_credit_since_none_after_it_can_be_decoded_without_it():
+    """The browser made one key, as it began: one picture lost was all of them lost."""
+    recording = read(ONE_KEY)
+    recorded = [r.record.body for r in timed(recording) if isinstance(r.record.body, Picture)]
+    server = BusyServer([])
+
+    async def talk(access):
+        played, _ = await asyncio.gather(play(recording, access, 5.0), server.answer())
+        return played
+
+    played = asyncio.run(server.serve(talk))
+    assert [picture.body for picture in server.pictures()] == recorded
+    assert played.pictures_dropped == 0
+    assert played.late_s > BusyServer.BUSY_S / 2
