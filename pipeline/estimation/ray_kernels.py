@@ -7,6 +7,7 @@ from math import sqrt
 import numpy as np
 
 from pipeline.camera.lens_kernels import NEAREST_M
+from pipeline.estimation.doubted_date_kernels import doubt_date, put_velocity
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_OFFSET
 from pipeline.frames import Array
 from pipeline.signals import Flags
@@ -14,9 +15,9 @@ from pipeline.so3_kernels import kernel, put_exp
 
 TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
 """Error states that a picture depends on: δp, θ, and its time."""
-TOLD_SHARE = 3.0
-"""Of how fast LEDs pass by a motion that is measured and told: so much faster than by that they
-must pass before half is believed about the time offset."""
+SURELY = 3.0
+"""LEDs must pass so many times as fast as by a motion that is measured and told, and as how fast
+they pass is doubted, before half is believed about the time offset."""
 
 
 @kernel
@@ -36,32 +37,22 @@ def _expect(
     `told` (4,) is the velocity in c of a body that tells its own, which x has not, and whether that
     is measured, 1 or 0; of another one zeros.
     """
-    arm, w = R @ led, inputs[6:9]
-    q0, q1, q2 = x[0] + arm[0], x[1] + arm[1], x[2] + arm[2]
-    if not q0 > NEAREST_M:
+    q, by_body, v = R @ led, np.empty(3), np.empty(3)
+    q += x[0:3]
+    if not q[0] > NEAREST_M:
         return False
-    b = inputs[0:3]
-    by_body = told[0:3] + R @ np.array(
-        [
-            b[1] * led[2] - b[2] * led[1],
-            b[2] * led[0] - b[0] * led[2],
-            b[0] * led[1] - b[1] * led[0],
-        ]
-    )
-    v0 = x[3] - w[1] * q2 + w[2] * q1 + by_body[0]
-    v1 = x[4] - w[2] * q0 + w[0] * q2 + by_body[1]
-    v2 = x[5] - w[0] * q1 + w[1] * q0 + by_body[2]
+    put_velocity(x[3:6], R, inputs, told, led, q, by_body, v)
     for row in range(2):
-        tangent, rate = (q1 / q0, v1) if row == 0 else (q2 / q0, v2)
-        H[row, 0], H[row, 1], H[row, 2] = -tangent / q0, 0.0, 0.0
-        H[row, 1 + row] = 1.0 / q0
+        tangent = q[1 + row] / q[0]
+        H[row, 0], H[row, 1], H[row, 2] = -tangent / q[0], 0.0, 0.0
+        H[row, 1 + row] = 1.0 / q[0]
         for j in range(3):  # −D R [led]×
             k, m = (j + 1) % 3, (j + 2) % 3
             d_k = H[row, 0] * R[0, k] + H[row, 1] * R[1, k] + H[row, 2] * R[2, k]
             d_m = H[row, 0] * R[0, m] + H[row, 1] * R[1, m] + H[row, 2] * R[2, m]
             H[row, 3 + j] = d_m * led[k] - d_k * led[m]
-        H[row, 6] = (rate - tangent * v0) / q0
-        H[row, 7] = told[3] * (by_body[1 + row] - tangent * by_body[0]) / q0
+        H[row, 6] = (v[1 + row] - tangent * v[0]) / q[0]
+        H[row, 7] = told[3] * (by_body[1 + row] - tangent * by_body[0]) / q[0]
         expected[row] = tangent + H[row, 6] * ahead
     return True
 
@@ -115,7 +106,7 @@ def fuse_rays(
     x: Array,
     R: Array,
     P: Array,
-    inputs: Array,
+    around: Array,
     told: Array,
     leds_in_b: Array,
     ahead: Array,
@@ -127,37 +118,43 @@ def fuse_rays(
 ) -> float:
     """Fuse the rays of a picture (m,), each `ahead` seconds after x, R, P; `told` as `_expect`.
 
+    `around` (3, 12) are the inputs as `doubt_date` takes them; (1, 12): the date is not doubted.
     `use` (m,): −1 is decided here, against the state before the picture, 0 is left out, 1 is fused.
     Gives χ² of the fused ones, two degrees of freedom each; NaN: P can't be believed.
 
     The time offset takes 1 − 1/(1 + (v/slow)⁴) of its correction, v [rad/s] being how fast the
     LEDs move through the picture (RMS): of slow ones, what a picture is off is not noise but a
     codec's dead zone, a sensor's rounding or a bias. Hundreds of pictures share that, and it would
-    pass for a delay. So would the delay of a motion that is measured and told: slow² is `still`²
-    and (`TOLD_SHARE` times how fast LEDs pass by that)². Infinite: it takes nothing. A partial
+    pass for a delay. So would the delay of a motion that is measured and told, and a speed that is
+    corrected from picture to picture: slow² is `still`² and `SURELY`² times the squares of how fast
+    LEDs pass by the first and of σ of how fast they pass. Infinite: it takes nothing. A partial
     update (Brink 2017, Partial-Update Schmidt-Kalman Filter, JGCD 40).
     """
     m = len(use)
     H, miss, expected = np.zeros((m, 2, 8)), np.zeros((m, 2)), np.zeros(2)
+    inputs, C, doubt = around[len(around) // 2], covariances.copy(), np.zeros(m)
     for i in range(m):
         if not _expect(x, R, inputs, told, leds_in_b[i], ahead[i], expected, H[i]):
             use[i] = 0
             continue
         miss[i] = tangents[i] - expected
+        if len(around) == 3:
+            doubt[i] = doubt_date(x, R, P, around, told, leds_in_b[i], H[i], miss[i], C[i])
         if use[i] < 0:
-            use[i] = 1 if _unlikelihood(P, H[i], covariances[i], miss[i]) <= gate else 0
+            use[i] = 1 if _unlikelihood(P, H[i], C[i], miss[i]) <= gate else 0
     n, chi2, variance = P.shape[0], 0.0, P[OFFSET, OFFSET]
     dx, v = np.zeros(n), np.empty(n)
-    count, square, told_square = 0, 0.0, 0.0
+    count, square, told_square, doubted = 0, 0.0, 0.0, 0.0
     for i in range(m):
         if use[i] != 1:
             continue
         count += 1
         square += H[i, 0, 6] * H[i, 0, 6] + H[i, 1, 6] * H[i, 1, 6]
+        doubted += doubt[i]
         told_square += H[i, 0, 7] * H[i, 0, 7] + H[i, 1, 7] * H[i, 1, 7]
-        a = sqrt(covariances[i, 0, 0])
-        b = covariances[i, 1, 0] / a
-        c = sqrt(covariances[i, 1, 1] - b * b)
+        a = sqrt(C[i, 0, 0])
+        b = C[i, 1, 0] / a
+        c = sqrt(C[i, 1, 1] - b * b)
         H[i, 0] /= a
         miss[i, 0] /= a
         H[i, 1] = (H[i, 1] - b * H[i, 0]) / c
@@ -165,7 +162,7 @@ def fuse_rays(
         chi2 += _fuse_scalar(P, dx, H[i, 0], miss[i, 0], v)
         chi2 += _fuse_scalar(P, dx, H[i, 1], miss[i, 1], v)
     if count > 0 and still > 0.0:
-        slow = still * still + TOLD_SHARE * TOLD_SHARE * told_square / count
+        slow = still * still + SURELY * SURELY * (told_square + doubted) / count
         left = 1.0 / (1.0 + (square / count / slow) ** 2)
         dx[OFFSET] *= 1.0 - left
         P[OFFSET, OFFSET] += left * left * (variance - P[OFFSET, OFFSET])

@@ -192,7 +192,8 @@ class RelativeFilter:
             misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
             if misdated is not None:
                 return misdated, 1.0
-            if self._misdated.are_redated:
+            # a robot that only tells its motion may have done another one: it dates no picture
+            if self._misdated.are_redated and self._motion is None:
                 track.redate(STUMBLE_S)
                 predicted.copy(track.predicted(predicted.t))
                 return seen, 1.0

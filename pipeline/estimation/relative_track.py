@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.aliased_tone import WANDERS, Tone
+from pipeline.estimation.doubted_date_kernels import AT
 from pipeline.estimation.full_scale import LOUD, FullScale
 from pipeline.estimation.hand_motion_kernels import WINDOW
 from pipeline.estimation.hand_predictor import HandPredictor
@@ -46,6 +47,8 @@ KEPT: Final = 2 * WINDOW
 MISLED: Final = (0.05, 0.05, 0.3)
 """By so much place [m], attitude [rad] and velocity [m/s] may be wrong before a tone is known."""
 NOTHING_TOLD: Final = np.zeros(4)
+LINEAR_S: Final = 0.003
+"""A time offset known so well [s] is linear in all that a picture shows of it."""
 AMPLITUDES: Final = 12
 """Of a tone."""
 BENT: Final = 2
@@ -56,11 +59,16 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
     """State x (19,), attitude R and covariance P (22, 22) at any time since the base."""
 
     def __init__(
-        self, config: RelativeConfig, leds_in_b: Array, motion: ToldMotion | None = None
+        self,
+        config: RelativeConfig,
+        leds_in_b: Array,
+        motion: ToldMotion | None = None,
+        doubts_dates: bool = True,
     ) -> None:
         """Take the noise as configured; LEDs (n, 3) [m]; `motion` of a body that tells its own.
 
-        The config is then that of `told_motion.for_body`.
+        The config is then that of `told_motion.for_body`. Who judges pictures doubts no dates: they
+        would be the excuse for each that lies.
         """
         super().__init__(X, N, MOVING, BENT, KEPT)
         self._told = self._vertical = None
@@ -68,7 +76,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         if motion is not None:
             self._told, self._vertical = ToldTwist(motion), ToldVertical(motion)
             self.body = ImuStream(more=TOLD - BODY)
-        self._leds_in_b = np.ascontiguousarray(leds_in_b)
+        self._leds_in_b, self._doubts_dates = np.ascontiguousarray(leds_in_b), doubts_dates
         self._walks, self._calm = walks_of(config), walks_of(config)
         self._hand, self._phone_factor = HandPredictor(config.hand), 1.0
         self._scales = [[FullScale(loud) for loud in LOUD] for _ in range(2)]
@@ -187,6 +195,18 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         if self._vertical is not None:
             self._vertical.learn(start.t, start.R, self.phone, self.body)
         super().begin(self._with_tone(start) if self.tone is not None else start)
+        if self._is_date_doubted(self.base):
+            self._doubt_date(self.base)
+
+    def _is_date_doubted(self, here: Checkpoint[VisionMeasurement]) -> bool:
+        return self._doubts_dates and bool(here.P[OFFSET, OFFSET] >= LINEAR_S**2)
+
+    def _doubt_date(self, start: Checkpoint[VisionMeasurement]) -> None:
+        """Let it be where its picture shows it at its date, not at its stamp: P of [1 −a] and u."""
+        A = np.eye(len(start.P))
+        A[:6, OFFSET] = -self.passing(start)
+        start.P[:] = A @ start.P @ A.T
+        start.P[:3, :3] += start.P[OFFSET, OFFSET] * start.P[6:9, 6:9]
 
     def carry_on(self, here: Checkpoint[VisionMeasurement]) -> None:
         """Begin at what was predicted there, corrected since, with all that it is."""
@@ -303,11 +323,18 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
         return self._inputs(self.now)
 
-    def _inputs(self, here: Checkpoint[VisionMeasurement]) -> Array:
+    def _around(self, here: Checkpoint[VisionMeasurement]) -> Array:
+        """(1, 12) inputs there, or (3, 12) as `doubt_date` takes them."""
+        if not self._is_date_doubted(here):
+            return self._inputs(here)[None]
+        apart = AT * sqrt(here.P[OFFSET, OFFSET])
+        return np.array([self._inputs(here, by) for by in (-apart, 0.0, apart)])
+
+    def _inputs(self, here: Checkpoint[VisionMeasurement], later: float = 0.0) -> Array:
         body, phone, hand = self.body, self.phone, self._hand.forecast
         return np.asarray(
             inputs_at(
-                here.t,
+                here.t + later,
                 here.x,
                 body.times,
                 body.values,
@@ -327,7 +354,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
                 here.x,
                 here.R,
                 here.P,
-                self._inputs(here),
+                self._around(here),
                 self._told_at(here),
                 self._leds_in_b[rays.led],
                 rays.t + (here.x[X_OFFSET] - here.t),

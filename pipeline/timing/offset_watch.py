@@ -1,8 +1,8 @@
 """Health monitor of the learnt time offset: a lock on the wrong one is worse than none.
 
 A tremor looks alike a ninth of a second later, and a filter sees only the valley it is in. So a
-coarse offset, found apart from it (`time_offset`), must agree; before there is one, stamps are
-taken to be nearly right.
+coarse offset, found apart from it (`time_offset`), must agree; before there is one, it is believed
+within that valley.
 
 The filter follows dates that change within pictures, the coarse one within its window. Once both
 have agreed it is refuted by pictures from after they parted alone.
@@ -15,8 +15,9 @@ from typing import Final
 
 from pipeline.signals import StampOffset
 
-STRAY_S: Final = 0.02
-"""So far may the learnt offset be from none ..."""
+STRAY_S: Final = 0.05
+"""So far may the learnt offset be from none: two and a half standard deviations of what it begins
+with, as far as a filter that is linear in it finds by itself ..."""
 BESIDE_S: Final = 0.008
 """... and from the coarse one, which is right to 3 ms as soon as there is one: a filter that was
 sure of 20 ms while phone and robot hardly moved took fifteen seconds to get rid of the half."""

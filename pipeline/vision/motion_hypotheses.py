@@ -71,7 +71,7 @@ class MotionHypothesis:
 
     def __init__(self, config: RelativeConfig, leds_in_b: Array, rest: Array | None) -> None:
         """`rest` (3,): specific force in b [m/s²] of what rests; None: the robot's samples."""
-        self._track, self._rest = RelativeTrack(config, leds_in_b), rest
+        self._track, self._rest = RelativeTrack(config, leds_in_b, doubts_dates=False), rest
         self._config = config
         self._begun = False
 

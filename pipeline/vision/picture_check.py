@@ -115,7 +115,7 @@ class PictureCheck:
         """Of a robot with LEDs (n, 3) [m]; nothing known. `motion`: it has no motion sensors."""
         self._config = for_body(RelativeConfig(gate_chi2=UNGATED), motion)
         self._leds_in_b = leds_in_b
-        self._track = RelativeTrack(self._config, leds_in_b, motion)
+        self._track = RelativeTrack(self._config, leds_in_b, motion, doubts_dates=False)
         self._knows = False
         self._learnt: Learnt | None = None
         """Of the motion sensors, while the camera told the truth."""

@@ -85,7 +85,7 @@ def test_an_arm_is_led_as_a_robot_of_light(seed, rest_s):
     hand = make_hand("filming", seed=seed, start=arm.start, rest_s=rest_s)
     scene = SimulationOptions(hand="filming", seed=seed, frame_rate_hz=15.0)
     simulation = ScreenSimulation(arm, TeleopConfig(), scene, Display(), hand=hand)
-    figures = result_of(simulation.run(10.0), simulation.scene, 0.0)
+    figures = result_of(simulation.run(10.5), simulation.scene, 0.0)
     assert figures.tracked_s > 3.0
     assert not figures.ended
     assert figures.rms_mm < 20.0

@@ -51,7 +51,9 @@ def picture(x, R, noise=1e-3, seed=3):
 def fuse(x, R, P, tangents, C, ahead=HERE, gate=GATE, use=None, leds=LEDS, still=0.0):
     """(χ², use); x, R, P are changed."""
     use = np.full(len(leds), -1, dtype=np.int8) if use is None else use
-    return fuse_rays(x, R, P, FELT, NOTHING_TOLD, leds, ahead, tangents, C, gate, still, use), use
+    return fuse_rays(
+        x, R, P, FELT[None], NOTHING_TOLD, leds, ahead, tangents, C, gate, still, use
+    ), use
 
 
 @pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2])
@@ -268,7 +270,7 @@ def test_of_leds_that_pass_by_what_is_told_little_is_believed_about_the_time_off
         before = here[X_OFFSET]
         use = np.full(len(LEDS), -1, dtype=np.int8)
         C = covariances(4)
-        fuse_rays(here, there, known, FELT, told, LEDS, HERE, tangents, C, GATE, 0.01, use)
+        fuse_rays(here, there, known, FELT[None], told, LEDS, HERE, tangents, C, GATE, 0.01, use)
         offsets[name] = here[X_OFFSET] - before, known[OFFSET, OFFSET] / P[OFFSET, OFFSET]
     assert abs(offsets["told"][0]) < 0.1 * abs(offsets["felt"][0])
     assert offsets["told"][1] > 0.8 > 0.5 > offsets["felt"][1]
