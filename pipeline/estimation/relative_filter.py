@@ -26,9 +26,9 @@ from pipeline.estimation.relative_noise import initial_biases
 from pipeline.estimation.relative_start import (
     Learnt,
     can_start,
+    correct_by_pose,
     first_checkpoint,
     is_better_start,
-    is_carried_by,
 )
 from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_imu_sample
@@ -272,7 +272,7 @@ class RelativeFilter:
         """Begin at the picture's own pose with all else that is known, how it moves too."""
         assert seen.pose is not None
         e, passing = _missed(seen.pose, predicted), self._track.passing(predicted)
-        if not is_carried_by(seen, predicted, e, passing, self._config):
+        if not correct_by_pose(seen, predicted, e, passing, self._config):
             return False
         self._track.carry_on(predicted)
         self._misses, self._t_seen = 0, max(self._t_seen, seen.t)

@@ -44,7 +44,7 @@ def is_better_start(seen: VisionMeasurement, P: Array, config: RelativeConfig) -
     )
 
 
-def is_carried_by(
+def correct_by_pose(
     seen: VisionMeasurement,
     here: Checkpoint[VisionMeasurement],
     e: Array,

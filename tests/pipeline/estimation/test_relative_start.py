@@ -8,7 +8,7 @@ from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import OFFSET, X_OFFSET, N, X
-from pipeline.estimation.relative_start import is_carried_by
+from pipeline.estimation.relative_start import correct_by_pose
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import exp, log
 from pipeline.signals import LedRays, RelativePose, VisionMeasurement
@@ -57,7 +57,7 @@ def test_a_pose_corrects_all_that_is_known_as_a_kalman_filter_does():
     here, e = predicted(), np.array([0.06, -0.04, 0.02, 0.01, 0.0, -0.02])
     before, passing = here.x.copy(), np.array([0.3, -0.2, 0.1, 0.5, 0.2, -0.4])
     R_before, P_before = here.R.copy(), here.P.copy()
-    assert is_carried_by(shown(here, e), here, e, passing, CONFIG)
+    assert correct_by_pose(shown(here, e), here, e, passing, CONFIG)
 
     H = np.eye(6, N)
     H[:, OFFSET] = passing
@@ -77,7 +77,7 @@ def test_a_pose_corrects_all_that_is_known_as_a_kalman_filter_does():
 
 def test_two_pictures_tell_the_velocity():
     here, e = predicted(), np.array([0.06, -0.04, 0.02, 0.0, 0.0, 0.0])
-    assert is_carried_by(shown(here, e), here, e, np.zeros(6), CONFIG)
+    assert correct_by_pose(shown(here, e), here, e, np.zeros(6), CONFIG)
     sigma = np.sqrt(np.diag(here.P)[6:9])
     assert (sigma < 0.15).all()
     assert (np.abs(here.x[3:6] - e[:3] / 0.2) < 3.0 * sigma).all()
@@ -87,7 +87,7 @@ def test_two_pictures_tell_the_velocity():
 def test_a_pose_far_off_what_was_predicted_is_a_start_of_its_own(e):
     here, off = predicted(), np.array(e)
     before = (here.x.copy(), here.R.copy(), here.P.copy())
-    assert not is_carried_by(shown(here, off), here, off, np.zeros(6), CONFIG)
+    assert not correct_by_pose(shown(here, off), here, off, np.zeros(6), CONFIG)
     for left, was in zip((here.x, here.R, here.P), before, strict=True):
         np.testing.assert_array_equal(left, was)
 
@@ -95,5 +95,5 @@ def test_a_pose_far_off_what_was_predicted_is_a_start_of_its_own(e):
 def test_a_pose_that_is_not_finite_corrects_nothing():
     here, off = predicted(), np.full(6, np.nan)
     x = here.x.copy()
-    assert not is_carried_by(shown(here, np.zeros(6)), here, off, np.zeros(6), CONFIG)
+    assert not correct_by_pose(shown(here, np.zeros(6)), here, off, np.zeros(6), CONFIG)
     np.testing.assert_array_equal(here.x, x)
