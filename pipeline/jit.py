@@ -34,6 +34,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PACKAGES = ("pipeline", "hardware")
 BESIDE = os.path.join(ROOT, PACKAGES[0], "__pycache__")
 """Where kernels beside their sources lie, for all of them."""
+MARK = "warm-"
 _IS_COMPILED = re.compile(r"^@(?:kernel|numba\.njit)\b", re.MULTILINE)
 _IMPORTS = re.compile(r"^from ((?:pipeline|hardware)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 _COMPILES_IN = re.compile(r"\b(?:[a-z_]\w*|[A-Z][A-Z0-9_]+)\b")
@@ -99,12 +100,29 @@ def _cache_folders() -> tuple[str, ...]:
     return named, os.path.join(users, "lightleash", "kernels")
 
 
+def _marked() -> str:
+    """How names of files begin that say that all is compiled, of these sources by this numba."""
+    made_of = f"{kernel_stamp()}\0{numba.__version__}"
+    return f"{MARK}{sha256(made_of.encode()).hexdigest()[:16]}-"
+
+
 def _mark_of(folder: str) -> str:
-    """File that says that all is in `folder`: of these sources, this numba, this processor."""
-    target = cpu_target.target_context.codegen().magic_tuple()
-    made_of = f"{kernel_stamp()}\0{numba.__version__}\0{target}"
-    name = f"warm-{sha256(made_of.encode()).hexdigest()[:16]}"
+    """The file that says so of `folder` and this processor."""
+    target = str(cpu_target.target_context.codegen().magic_tuple())
+    name = _marked() + sha256(target.encode()).hexdigest()[:8]
     return os.path.join(folder or BESIDE, name)
+
+
+@cache
+def _unmark_others(folder: str) -> None:
+    """Say no more that all is in `folder` of other sources: these kernels take their place there.
+
+    Back at those, as after a look at another branch, each process would compile for itself.
+    """
+    folder = folder or BESIDE
+    for name in os.listdir(folder):
+        if name.startswith(MARK) and not name.startswith(_marked()):
+            os.remove(os.path.join(folder, name))
 
 
 def _is_writable(folder: str) -> bool:
@@ -183,6 +201,7 @@ class Index(caching.IndexDataCacheFile):
     def save(self, key: object, data: object) -> None:
         """Keep a kernel, unless the disk is full or not ours to write."""
         with contextlib.suppress(OSError):
+            _unmark_others(cache_folder() or "")
             super().save(key, data)
 
 

@@ -23,15 +23,20 @@ print(corner(0.5, np.eye(3)), sum(corner.stats.cache_hits.values()))
 """
 
 
-def run(tree: Path, **settings: str) -> tuple[float, int]:
-    """The caller's result, and how many of its kernels came from the cache."""
+def said(tree: Path, **settings: str) -> list[str]:
+    """The words of the caller."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
     environment = kept | {"PYTHONPATH": str(tree)} | settings
     command = [sys.executable, "-c", "import pipeline.caller"]
-    said = subprocess.run(
+    done = subprocess.run(
         command, cwd=tree, env=environment, capture_output=True, text=True, check=True
-    ).stdout
-    value, hits = said.split()
+    )
+    return done.stdout.split()
+
+
+def run(tree: Path, **settings: str) -> tuple[float, int]:
+    """The caller's result, and how many of its kernels came from the cache."""
+    value, hits = said(tree, **settings)
     return float(value), int(hits)
 
 
@@ -55,6 +60,34 @@ def test_an_edited_kernel_changes_the_next_process_also_through_its_callers(tmp_
     callee = package / "so3_kernels.py"
     callee.write_text(callee.read_text().replace("1.0 - k * (v1 * v1", "2.0 - k * (v1 * v1"))
     assert run(tmp_path) == (pytest.approx(first + 1.0), 0)
+
+
+ALL_KEPT = (
+    CALLER.split("print")[0]
+    + """
+from pipeline import jit
+was_kept = jit.are_kernels_kept()
+corner(0.5, np.eye(3))
+jit.note_kernels_kept()
+print(was_kept, sum(corner.stats.cache_hits.values()))
+"""
+)
+
+
+@pytest.mark.slow
+def test_after_a_look_at_other_sources_nobody_says_that_all_is_compiled(tmp_path):
+    """A process believed it, and compiled in flight what the others' had written over."""
+    package = package_in(tmp_path)
+    caller, callee = package / "caller.py", package / "so3_kernels.py"
+    caller.write_text(ALL_KEPT)
+    assert said(tmp_path) == ["False", "0"]
+    assert said(tmp_path) == ["True", "1"]
+    before = callee.read_text()
+    callee.write_text(before + "# looked at\n")
+    assert said(tmp_path) == ["False", "0"]
+    callee.write_text(before)
+    assert said(tmp_path) == ["False", "0"]
+    assert said(tmp_path) == ["True", "1"]
 
 
 def test_every_module_with_kernels_is_in_the_stamp_and_takes_numba_from_one_place():
