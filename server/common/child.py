@@ -155,8 +155,18 @@ def go_before_others() -> None:
     load.
     """
     set_niceness(PROMPT_NICENESS)
+    be_prompt()
+
+
+def be_prompt(thread: int = 0) -> None:
+    """Let this thread, or another one, run before all that have no real time, where permitted.
+
+    Threads and processes that this one begins inherit it, those of another one do not.
+    """
+    inherited = 0 if thread == 0 else getattr(os, "SCHED_RESET_ON_FORK", 0)
     with contextlib.suppress(AttributeError, OSError):
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PROMPT_PRIORITY))
+        param = os.sched_param(PROMPT_PRIORITY)
+        os.sched_setscheduler(thread, os.SCHED_RR | inherited, param)
 
 
 def set_niceness(niceness: int) -> None:

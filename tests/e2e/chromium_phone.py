@@ -11,7 +11,7 @@ import numpy as np
 from playwright.sync_api import BrowserContext, Page, sync_playwright
 
 from hardware.sim.hand import Hand
-from tests.e2e.chromium_channel import Channel, address, evaluation, value_of
+from tests.e2e.chromium_channel import Channel, address, evaluation, hurry, value_of
 from tests.e2e.fed_sensors import FedSensors
 from tests.e2e.page_scripts import STAMP_SENSORS
 from tests.e2e.played_phone import PLAYED, PlayedPhone
@@ -73,6 +73,7 @@ class ChromiumPhone(PlayedPhone):
         self.page: Page = context.new_page()
         self.page.add_init_script(PLAYED + STAMP_SENSORS)
         url = address(context, self.page)
+        hurry(context)
         self._channel, self._touches = Channel(url), False
         self._sensors = FedSensors(url, self._felt)
 
