@@ -19,7 +19,7 @@ from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.flight_log import Flight, FlightLog, to_its_end
 from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
-from tests.machine import slowness
+from tests.machine import Load, slowness
 
 LANDSCAPE = {
     "viewport": {"width": 915, "height": 412},
@@ -120,7 +120,7 @@ def flight(
     means where the robot is at the press: before a camera that stands quite still, through H.264
     of a picture without noise, the robot sways by 6 mm in depth until the hand moves.
     """
-    began, never, taps = time.monotonic(), "", MOST_TAPS
+    began, never, taps, load = time.monotonic(), "", MOST_TAPS, Load()
     distances: list[tuple[float, float]] = []
     with contextlib.closing(FlightLog(server)) as log:
         try:
@@ -130,7 +130,9 @@ def flight(
         except TimeoutError as error:
             never = str(error)
         status = server.request("GET", "/api/status")
-    return Flight(seconds, distances, status, log.said, phone.holes(began), never, taps, slowness())
+    spare, slow = load.spare, slowness()
+    holes = phone.holes(began)
+    return Flight(seconds, distances, status, log.said, holes, never, taps, slow, spare)
 
 
 def flown(

@@ -19,6 +19,7 @@ from server.protocol.wire import VERSION
 from tests import retries
 from tests.e2e.serving import Serving
 from tests.e2e.witness import Hole
+from tests.machine import overload
 
 AT_REST = ("DISARMED", "STOPPED", "LOST")
 GAP_S = FailsafeConfig().gap
@@ -107,7 +108,9 @@ class Flight:
     taps: int = 1
     """On Arm, until it was granted."""
     slowness: float = 1.0
-    """Of the machine, told in the account; it excuses nothing."""
+    """Of the machine, told in the account; by itself it excuses nothing."""
+    spare: float = 1.0
+    """Share of its processors' time that nobody wanted meanwhile."""
     missed: str = ""
     """Which bounds, though it reached its end."""
 
@@ -148,6 +151,11 @@ class Flight:
             if hole.s >= BORNE_S.get(hole.where, float("inf")) and since <= hole.t <= left + CAUSE_S
         ]
 
+    @property
+    def proofs(self) -> list[str]:
+        """That the machine was away, or asked for more than it has; empty: it was there."""
+        return [*map(str, self.excuse), *filter(None, [overload(self.slowness, self.spare)])]
+
     def account(self) -> str:
         """What happened, in lines."""
         lines = [
@@ -156,7 +164,8 @@ class Flight:
         if self.taps > 1:
             lines.append(f"  armed by tap {self.taps}")
         lines.append(
-            f"  work takes {self.slowness:.1f} times as long as where bounds were measured"
+            f"  work takes {self.slowness:.1f} times as long as where bounds were measured;"
+            f" {100.0 * self.spare:.0f} % of the processors' time was left"
         )
         began, mode = self.said[0].t if self.said else 0.0, ""
         for said in self.said:
@@ -181,6 +190,8 @@ def to_its_end(
 ) -> Flight:
     """The first flight that reaches its end, again as long as the machine was proven to be away.
 
+    So it was if it is weak and had no processor left (`overload`).
+
     `misses` says which bounds one missed that reached it, or "": it is no more excused.
 
     Raises:
@@ -195,8 +206,9 @@ def to_its_end(
                 return one
         print(one.account())
         let_go()
-        if not one.excuse or not left:
+        if not one.proofs or not left:
             break
-        print(f"once more, {left} left, for the machine was away:", *map(str, one.excuse))
-        retries.note(str(max(one.excuse, key=lambda hole: hole.s)))
+        print(f"once more, {left} left, for the machine was away:", *one.proofs)
+        longest = max(one.excuse, key=lambda hole: hole.s, default=None)
+        retries.note(str(longest or one.proofs[0]))
     raise AssertionError(one.account())

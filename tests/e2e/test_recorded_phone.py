@@ -22,7 +22,7 @@ from tests.e2e.flight_log import Flight, FlightLog, to_its_end
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import ANSWER_S, ZERO_N, mode, status, thrust, until
 from tests.e2e.witness import Witness
-from tests.machine import slowness
+from tests.machine import Load, slowness
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 RECORDING = Path(__file__).parents[1] / "data" / "chromium.mcap"
@@ -99,7 +99,7 @@ def recorded_phone(server: Serving) -> Iterator[None]:
 
 def flight(server: Serving, supervisor: Supervisor, witness: Witness) -> Flight:
     """From the reset to the place that proves that the hand leads; tried once."""
-    began, never = time.monotonic(), ""
+    began, never, load = time.monotonic(), "", Load()
     with (
         closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
         closing(FlightLog(server)) as log,
@@ -126,7 +126,9 @@ def flight(server: Serving, supervisor: Supervisor, witness: Witness) -> Flight:
         supervisor.request("stop")
         until(lambda: thrust(truth) < ZERO_N, DONE_S, "no thrust")
         until(lambda: mode(server) == "STOPPED", DONE_S, "STOPPED")
-    return Flight(MOVED_S, [], said, log.said, witness.holes(began), never, slowness=slowness())
+    spare, slow = load.spare, slowness()
+    holes = witness.holes(began)
+    return Flight(MOVED_S, [], said, log.said, holes, never, slowness=slow, spare=spare)
 
 
 def test_a_recorded_browser_moves_the_robot_which_a_supervisor_resets_arms_and_stops(

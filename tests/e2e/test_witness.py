@@ -110,9 +110,19 @@ def test_a_server_that_was_given_no_processor_is_an_excuse_and_one_at_work_is_no
 
 
 def test_a_weak_machine_is_told_of_and_no_excuse() -> None:
-    ended = replace(flight("RAMP"), slowness=2.7)
-    assert not ended.excuse
+    ended = replace(flight("RAMP"), slowness=2.7, spare=0.2)
+    assert not ended.proofs
     assert "work takes 2.7 times as long" in ended.account()
+    assert "20 % of the processors' time was left" in ended.account()
+
+
+def test_a_weak_machine_without_a_processor_left_is_an_excuse_and_a_strong_one_is_not() -> None:
+    asked_too_much = replace(flight("RAMP"), slowness=2.7, spare=0.04)
+    (proof,) = asked_too_much.proofs
+    assert "2.7 times as long" in proof
+    assert "4 % was left" in proof
+    assert not replace(asked_too_much, slowness=1.5).proofs
+    assert not replace(asked_too_much, spare=float("nan")).proofs
 
 
 def test_the_account_tells_modes_reasons_and_holes() -> None:
