@@ -5,6 +5,7 @@ Base axes k: the model's own, z up. Body axes b: those of the tip's site.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 import mujoco
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.plant_parameters import ArmParameters
-from pipeline.frames import Array, cross
+from pipeline.frames import Array
 
 KINDS: Final = {
     mujoco.mjtObj.mjOBJ_SITE: "site",
@@ -38,10 +39,23 @@ def jacobian_rates(jacobian: Array) -> Array:
     """
     n = jacobian.shape[1]
     v, omega, rates = jacobian[:3].T, jacobian[3:].T, np.zeros((n, 6, n))
-    for i, j in zip(*np.triu_indices(n, 1), strict=True):
-        rates[j, :3, i] = cross(omega[i], v[j]) + cross(v[i], omega[j])
-        rates[j, 3:, i] = cross(omega[i], omega[j])
+    i, j = _before(n)
+    rates[j, :3, i] = _crosses(omega[i], v[j]) + _crosses(v[i], omega[j])
+    rates[j, 3:, i] = _crosses(omega[i], omega[j])
     return rates
+
+
+@cache
+def _before(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Each pair of n joints, the one nearer to the base first."""
+    i, j = np.triu_indices(n, 1)
+    return i, j
+
+
+def _crosses(a: Array, b: Array) -> Array:
+    """a × b row by row (m, 3), two hundred times a second: np.cross costs twice as much."""
+    (a0, a1, a2), (b0, b1, b2) = a.T, b.T
+    return np.stack((a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0), axis=1)
 
 
 class ArmModel:

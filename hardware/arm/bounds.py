@@ -9,6 +9,7 @@ is always allowed.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Final
 
 import mujoco
@@ -99,7 +100,7 @@ class Bounds(mink.Limit):
         model, arm, ends = self._arm.model, self._arm, np.zeros(6)
         distance = mujoco.mj_geomDistance(model, data, one, other, SEES_M, ends)
         between = ends[3:] - ends[:3]
-        length = float(np.linalg.norm(between))
+        length = sqrt(between @ between)
         if distance >= SEES_M or length == 0.0:
             return None
         away = between / (length if distance > 0.0 else -length)
