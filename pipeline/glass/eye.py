@@ -5,6 +5,7 @@ It is the relative filter again, which leads robots: its body is the glass, at r
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +37,12 @@ REMEMBERED_PICTURES = 300
 AVERAGED_S = 0.1
 """Over which the phone's accelerometer is averaged."""
 OLD_S = 0.3
-"""An eye that rests on no picture newer than this is nobody's."""
+"""An eye whose newest picture is older than this, and than pictures are apart beside, is nobody's:
+by pictures that come late and seldom the light would else go out for moments."""
+MOST_APART_S = 0.2
+"""They count as no more apart than this: who looks away is no slow phone."""
+APART_PICTURES = 8
+"""So many say how far they are apart."""
 DATED_S = 1e-3
 """Standard deviation below which a time offset is told."""
 COARSE_S = 0.015
@@ -58,12 +64,14 @@ class Eye:
     sigma: float
     """Largest standard deviation [m]."""
     age: float
-    """Since the newest picture of it was taken [s]."""
+    """Since the newest picture of it was taken [s] ..."""
+    apart_s: float
+    """... and how far apart they were taken lately."""
 
     @property
     def is_sure(self) -> bool:
         """Whether light may be drawn for it."""
-        return self.age < OLD_S and self.sigma < UNSURE_M
+        return self.age < OLD_S + self.apart_s and self.sigma < UNSURE_M
 
     def at(self, t: float) -> Array:
         """Place (3,) at a time soon after [s]."""
@@ -79,6 +87,7 @@ class EyeTracker:
         self._filter, self._imus = RelativeFilter(AT_REST, glass.fiducials()), ImuStreams()
         self._stamps, self._is_misdated = CameraImuDelay(self._imus), False
         self._up_in_g, self._pictures = np.zeros(3), 0
+        self._taken: deque[float] = deque(maxlen=APART_PICTURES)
 
     @property
     def up_in_g(self) -> Array | None:
@@ -113,6 +122,13 @@ class EyeTracker:
         if self._is_misdated:
             seen = replace(seen, offset=offset)
         self._filter.add_seen(seen, now)
+        self._taken.append(seen.t)
+
+    @property
+    def _apart_s(self) -> float:
+        if len(self._taken) < APART_PICTURES:
+            return 0.0
+        return min(MOST_APART_S, float(np.median(np.diff(self._taken))))
 
     @property
     def time_offset(self) -> StampOffset | None:
@@ -133,4 +149,4 @@ class EyeTracker:
             return None
         R_gc = state.R_cb.T
         place, speed = -R_gc @ state.p_bc_in_c, -R_gc @ state.u_bf_in_c
-        return Eye(now, place, speed, state.sigma_p, state.age)
+        return Eye(now, place, speed, state.sigma_p, state.age, self._apart_s)

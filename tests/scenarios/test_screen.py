@@ -43,7 +43,12 @@ def test_few_and_late_pictures_lead_a_robot_of_light(pictures_hz, late_s):
     hand = make_hand("moving", seed=1000, start=SCREEN.start, rest_s=8.0)
     scene = SimulationOptions(hand="moving", seed=1000, frame_rate_hz=pictures_hz, latency_s=late_s)
     simulation = ScreenSimulation(SCREEN, CONFIG, scene, Display(), hand=hand)
-    figures = result_of(simulation.run(17.0), simulation.scene, 0.0)
+    shown = set()
+    while simulation.t < 17.0 and not simulation.trace.left:
+        simulation.advance()
+        shown |= {simulation.shows.phase} if simulation.trace.t else set()
+    figures = result_of(simulation.trace, simulation.scene, 0.0)
+    assert shown == {"robot"}, "nor does the light go out for a moment"
     assert figures.tracked_s > 5.0
     assert not figures.ended
     assert figures.rms_mm < 8.0
