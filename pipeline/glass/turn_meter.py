@@ -19,10 +19,8 @@ import numpy as np
 from pipeline.frames import Array
 from pipeline.imu_stream import ImuStream
 from pipeline.signals import PhoneImu, RelativePose
-from pipeline.vision.steadied_picture import EVEN
+from pipeline.vision.steadied_picture import EVEN, LONGEST_S
 
-LONGEST_S: Final = 0.1
-"""Between two pictures."""
 KEPT: Final = 1800
 """Jumps: a minute's."""
 LEAST: Final = 60

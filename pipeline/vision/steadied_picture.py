@@ -26,6 +26,9 @@ STEADIED: Final = 0.4
 last); steadied ones show 0.3 and less."""
 CLEAR: Final = 15.0
 """Times the variance of where a picture is predicted: so far the predicted jumps are no noise."""
+LONGEST_S: Final = 0.1
+"""Between two pictures: in more a hand trembles to and fro, and the jumps of pictures farther apart
+are those of who leads, and of what is learnt of the speed from picture to picture."""
 EVEN: Final = 0.25
 """By so much of it the time between two pictures may differ from the time between those before."""
 PICTURES: Final = 6
@@ -53,7 +56,7 @@ class SteadiedPicture:
             variance: Of the difference [m²], both axes together.
         """
         moved, apart = np.array([seen, predicted]), t - since
-        is_even = since == self._t and abs(apart - self._apart) < EVEN * apart
+        is_even = since == self._t and abs(apart - self._apart) < EVEN * apart < EVEN * LONGEST_S
         self._t, self._apart = t, apart
         if not is_even:  # what was seen before is forgotten bit by bit: nobody stays accused by it
             self._jumps += MEMORY * (self._jumps.mean() - self._jumps)

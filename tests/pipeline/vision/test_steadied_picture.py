@@ -65,3 +65,10 @@ def test_noise_is_not_predicted_jumps() -> None:
 
 def test_some_pictures_are_too_few_to_say_so() -> None:
     assert not watched(0.0 * JUMPS[:5], JUMPS[:5]).is_steadied
+
+
+@pytest.mark.parametrize(("pictures_hz", "tells"), [(5.0, False), (9.0, False), (12.0, True)])
+def test_pictures_too_far_apart_for_a_hands_trembling_tell_nothing(pictures_hz, tells) -> None:
+    """A robot of light was led well by five a second, and called steadied after ten seconds."""
+    jumps = watched(0.3 * JUMPS, JUMPS, dates=np.arange(90) / pictures_hz)
+    assert jumps.is_steadied == tells
