@@ -24,6 +24,7 @@ from server.replay.dates import timed
 from server.replay.offline import Offline, run_offline
 from server.replay.setting import body_samples, recorded_robot
 from server.replay.table import COLUMNS
+from tests.data.record_flight import record_flight
 from tests.server.export.recordings import TWIST_IN_B, told_a_twist
 from tests.server.page_server import WELCOME, PageServer, status
 
@@ -33,8 +34,9 @@ AT_REST = Motion((0.0, 0.0, 0.0), (9.8, 0.0, 0.0), None, 90)
 
 
 @pytest.fixture(scope="module")
-def flight():
-    return read(FLIGHT)
+def flight(tmp_path_factory):
+    """Flown by what is held against it: a filter of another day was sure at another moment."""
+    return read(record_flight(tmp_path_factory.mktemp("flight")))
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +142,8 @@ def test_offline_estimates_are_those_of_the_flight(flight, offline_rows):
     assert np.max(errors) < 0.02
 
 
-def test_a_robot_that_takes_a_twist_is_replayed_with_what_it_measured(flight, tmp_path):
+def test_a_robot_that_takes_a_twist_is_replayed_with_what_it_measured(tmp_path):
+    flight = read(FLIGHT)
     recording = read(told_a_twist(tmp_path))
     assert recorded_robot(recording).robot.twist is not None
     samples = body_samples(recording)
