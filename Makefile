@@ -100,11 +100,12 @@ kernels: dev
 kernels pytest real robots pages quiet fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
 
 # First flights, whose phones and robots share the machine with nobody: what runs beside them, and be
-# it only when nobody else wants to, makes a virtual machine's processors wait. Then what else is real,
-# one at a time: a browser and a flight beside each other starve both, and it would end no sooner, as
-# what no clock hurries takes what they leave, and is the last to end.
+# it only when nobody else wants to, makes a virtual machine's processors wait. A machine that is too
+# weak for them in real time flies them in slow motion. Then what else is real, one at a time: a
+# browser and a flight beside each other starve both, and it would end no sooner, as what no clock
+# hurries takes what they leave, and is the last to end.
 pytest: dev
-	$(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
+	$(BIN)/python -m tests.slow_motion $(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
 	$(MAKE) --jobs=2 --keep-going --output-sync real quiet && exit $$flown
 
 real: dev

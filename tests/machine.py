@@ -28,6 +28,9 @@ WEAK: Final = 1.8
 """Times as long as there, and a machine is weak."""
 SPARE: Final = 0.08
 """Share of its processors' time: with less left, somebody waited for one again and again."""
+SLOW_MOTION: Final = "SLOW_MOTION"
+"""In a process's environment: how many of the world's seconds one of its own takes, where it lives
+in slow motion (`tests.slow_motion`)."""
 STAT, IDLE = Path("/proc/stat"), (4, 5)
 """Since its start, all processors together, in 1/100 s: those without work, and those whose work
 waits for a disk (proc(5))."""
@@ -50,13 +53,18 @@ def slowness() -> float:
     return max(1.0, median(took) / REFERENCE_S)
 
 
+def own_s(world_s: float) -> float:
+    """What the kernel tells [s], which is in the world's time, in that of this process."""
+    return world_s / float(os.environ.get(SLOW_MOTION, "1"))
+
+
 def _idle_s() -> float:
     """What its processors had nothing to do since its start [s], together; NaN: nobody tells."""
     try:
         told = STAT.read_text().split("\n", 1)[0].split()
     except OSError:
         return float("nan")
-    return sum(int(told[k]) for k in IDLE) / os.sysconf("SC_CLK_TCK")
+    return own_s(sum(int(told[k]) for k in IDLE) / os.sysconf("SC_CLK_TCK"))
 
 
 class Load:

@@ -19,7 +19,7 @@ from server.protocol.wire import VERSION
 from tests import retries
 from tests.e2e.serving import Serving
 from tests.e2e.witness import Hole
-from tests.machine import overload
+from tests.machine import overload, own_s
 
 AT_REST = ("DISARMED", "STOPPED", "LOST")
 GAP_S = FailsafeConfig().gap
@@ -132,7 +132,7 @@ class Flight:
     @property
     def starved(self) -> list[Hole]:
         """When the server, in its own words, was longer without a processor than ever before."""
-        told = [(said.t, 1e-3 * said.server.get(WAITED, 0.0)) for said in self.said]
+        told = [(said.t, own_s(1e-3 * said.server.get(WAITED, 0.0))) for said in self.said]
         grown = pairwise(told)
         return [Hole("server", t, s) for (_, before), (t, s) in grown if s > before]
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import IO
 
 from server.control.tick_rate import OVER_S, TickRate
+from tests.machine import own_s
 
 PERIOD_S = 0.005
 NOTED_S = 0.02
@@ -142,7 +143,7 @@ def _taken() -> list[float]:
     """From each processor since the machine's start [s]; empty if nobody knows."""
     with contextlib.suppress(OSError):
         rows = [line.split() for line in STAT.read_text().splitlines()]
-        return [TICK_S * int(row[STEAL]) for row in rows if PROCESSOR.fullmatch(row[0])]
+        return [own_s(TICK_S * int(row[STEAL])) for row in rows if PROCESSOR.fullmatch(row[0])]
     return []
 
 
