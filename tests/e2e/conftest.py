@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import BrowserContext
+from playwright.sync_api import BrowserContext, expect
 
 from tests.e2e.serving import printed_by_servers
 from tests.e2e.written_pages import written_pages
@@ -18,6 +18,9 @@ FIREFOX_NAMES = ("firefox-esr", "firefox")
 PRINTED_BEFORE = pytest.StashKey[dict[Path, int]]()
 TOLD_CHARACTERS = 6_000
 """Of what a server printed in a test that has failed: the newest."""
+
+# What a page must come to show. No bound of ours: a weak machine draws a page for many seconds.
+expect.set_options(timeout=60_000)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

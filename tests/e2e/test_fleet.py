@@ -18,7 +18,6 @@ from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import get, mode, processes, reset, status, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
-WAIT_MS = 30_000
 ROBOTS = {"left": "ames", "right": "twister"}
 PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
 SMALLEST_PX = """
@@ -82,7 +81,7 @@ def test_one_browser_is_in_at_both_and_stays_in_at_both(
     pages = [supervising(context, one) for one in (left, right)]
     for _ in range(2):
         for page, (name, robot) in zip(pages, ROBOTS.items(), strict=True):
-            expect(page.locator("#mode")).to_have_text("DISARMED", timeout=WAIT_MS)
+            expect(page.locator("#mode")).to_have_text("DISARMED")
             expect(page.locator("#robot")).to_have_text(f"{name} · {robot}")
             expect(page).to_have_title(f"DISARMED · {name}")
             expect(page.locator("#people li")).to_have_count(1)
@@ -101,7 +100,7 @@ def test_a_phones_page_says_whose_robot_it_leads(context: BrowserContext, left: 
         phone = held.new_page()
         phone.goto(f"{left.local_https}/{left.link()}")
         phone.click("#start")
-        expect(phone.locator("#server")).to_have_text("left", timeout=WAIT_MS)
+        expect(phone.locator("#server")).to_have_text("left")
         expect(phone.locator("#server")).to_be_visible()
         expect(phone).to_have_title("left · Lightleash")
     until(lambda: status(left)["operator"] == "", 20.0, "no phone")
@@ -164,7 +163,7 @@ def test_the_page_of_all_robots_shows_each_and_can_do_nothing(
     context: BrowserContext, left: Serving, right: Serving
 ) -> None:
     board = supervising(context, left)
-    expect(board.locator("#mode")).to_have_text("DISARMED", timeout=WAIT_MS)
+    expect(board.locator("#mode")).to_have_text("DISARMED")
     with context.expect_page() as opened:
         board.click("text=All robots here")
     page = opened.value
@@ -172,16 +171,16 @@ def test_the_page_of_all_robots_shows_each_and_can_do_nothing(
     asked: list[str] = []
     page.on("request", lambda request: asked.append(f"{request.method} {request.url}"))
     for name, robot in ROBOTS.items():
-        expect(card(page, name).locator("h2")).to_contain_text(robot, timeout=WAIT_MS)
+        expect(card(page, name).locator("h2")).to_contain_text(robot)
         expect(card(page, name).locator("strong")).to_have_text("DISARMED")
     right.request("POST", "/api/stop")
-    expect(card(page, "right").locator("strong")).to_have_text("STOPPED", timeout=WAIT_MS)
+    expect(card(page, "right").locator("strong")).to_have_text("STOPPED")
     expect(card(page, "left").locator("strong")).to_have_text("DISARMED")
     reset(right)
     right.request("POST", "/api/virtual-phone")
     try:
-        expect(card(page, "right").locator("dl")).to_contain_text("virtual", timeout=WAIT_MS)
-        expect(card(page, "right").locator("dl")).to_contain_text(" ms", timeout=WAIT_MS)
+        expect(card(page, "right").locator("dl")).to_contain_text("virtual")
+        expect(card(page, "right").locator("dl")).to_contain_text(" ms")
         expect(card(page, "left").locator("dl")).to_contain_text("nobody")
     finally:
         right.request("DELETE", "/api/virtual-phone")
@@ -200,7 +199,7 @@ def test_who_is_not_let_in_is_told_so_and_shown_nothing(
     with context.browser.new_context(ignore_https_errors=True) as stranger:
         page = stranger.new_page()
         page.goto(f"{left.local_https}/fleet")
-        expect(page.locator("#why")).to_contain_text("pair first", timeout=WAIT_MS)
+        expect(page.locator("#why")).to_contain_text("pair first")
         assert page.locator(".server").count() == 0
 
 
@@ -212,7 +211,7 @@ def test_it_can_be_read_on_a_phone_and_across_a_room(
     page = context.new_page()
     page.set_viewport_size({"width": size[0], "height": size[1]})
     page.goto(f"{left.http_url}/fleet")
-    expect(page.locator(".server")).to_have_count(2, timeout=WAIT_MS)
+    expect(page.locator(".server")).to_have_count(2)
     assert page.evaluate(SMALLEST_PX) >= 16.0
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert violations(page) == []
@@ -231,9 +230,9 @@ def test_a_killed_server_is_gone_and_one_that_was_told_to_end_has_ended(
         ("told", signal.SIGTERM, "ENDED"),
     ):
         with serving(folder, "--robot", "twister", name=name) as third:
-            expect(card(page, name).locator("strong")).to_have_text("DISARMED", timeout=WAIT_MS)
+            expect(card(page, name).locator("strong")).to_have_text("DISARMED")
             third.process.send_signal(number)
-            expect(card(page, name).locator("strong")).to_have_text(title, timeout=WAIT_MS)
+            expect(card(page, name).locator("strong")).to_have_text(title)
         expect(card(page, name).locator("a")).to_be_hidden()
         expect(card(page, name).locator("dl")).to_have_text("")
     expect(card(page, "left").locator("strong")).to_have_text("DISARMED")
@@ -246,12 +245,12 @@ def test_without_an_answer_of_its_own_server_the_page_shows_no_mode(
 ) -> None:
     board, page = supervising(context, left), context.new_page()
     page.goto(f"{left.http_url}/fleet")
-    expect(card(page, "right").locator("strong")).to_have_text("DISARMED", timeout=WAIT_MS)
+    expect(card(page, "right").locator("strong")).to_have_text("DISARMED")
     page.route("**/api/fleet", lambda route: route.abort())
     for name in ROBOTS:
-        expect(card(page, name).locator("strong")).to_have_text("NO WORD", timeout=WAIT_MS)
+        expect(card(page, name).locator("strong")).to_have_text("NO WORD")
     expect(page.locator("#why")).to_have_text("The server of this page does not answer.")
     page.unroute("**/api/fleet")
-    expect(card(page, "left").locator("strong")).to_have_text("DISARMED", timeout=WAIT_MS)
+    expect(card(page, "left").locator("strong")).to_have_text("DISARMED")
     for one in (page, board):
         one.close()

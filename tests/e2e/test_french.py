@@ -11,7 +11,6 @@ from tests.e2e.chromium_phone import browser
 from tests.e2e.serving import Serving, serving
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
-WAIT_MS = 30_000
 SCREEN = {"viewport": {"width": 412, "height": 915}}
 
 
@@ -34,9 +33,9 @@ def test_who_prefers_french_is_told_in_french_what_the_page_and_the_server_say(
     with browser(chromium, locale="fr-FR", **SCREEN) as context:
         board, phone = context.new_page(), context.new_page()
         board.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
-        expect(board.locator("#people li")).to_have_count(1, timeout=WAIT_MS)
+        expect(board.locator("#people li")).to_have_count(1)
         phone.goto(f"{server.local_https}/{server.link()}")
-        expect(phone.locator("html")).to_have_attribute("lang", "fr", timeout=WAIT_MS)
+        expect(phone.locator("html")).to_have_attribute("lang", "fr")
         expect(phone.locator("#start")).to_have_text("Démarrer")
         expect(phone.locator("#last-stop-button")).to_have_attribute(
             "aria-label", "STOP\u00a0: arrêter le robot"
@@ -47,18 +46,16 @@ def test_who_prefers_french_is_told_in_french_what_the_page_and_the_server_say(
             "En attente de confirmation par un superviseur…"
         )
         board.click(".asking .confirm")
-        expect(phone.locator("#mode")).to_have_text("DÉSARMÉ", timeout=WAIT_MS)
+        expect(phone.locator("#mode")).to_have_text("DÉSARMÉ")
         expect(phone.locator("#wish")).to_have_text("Armer")
         # of the server: a browser without a hand has no calibration and no motion sensors
-        expect(phone.locator("#refusals")).to_contain_text(
-            "La caméra n’est pas étalonnée", timeout=WAIT_MS
-        )
+        expect(phone.locator("#refusals")).to_contain_text("La caméra n’est pas étalonnée")
         screen = context.new_page()
         screen.goto(f"{server.http_url}/screen")
-        expect(screen.locator("#start")).to_have_text("Plein écran", timeout=WAIT_MS)
+        expect(screen.locator("#start")).to_have_text("Plein écran")
         screen.route("**/api/whoami", lambda route: route.abort())
         screen.dispatch_event("#start", "click")
-        expect(screen.locator("#why")).to_have_text("Le serveur ne répond pas", timeout=WAIT_MS)
+        expect(screen.locator("#why")).to_have_text("Le serveur ne répond pas")
         assert asked_for(phone) == [
             *("french.js", "french_page.js", "french_server.js", "say.js", "translator.js"),
         ]
@@ -77,7 +74,7 @@ def test_who_prefers_another_language_loads_no_french_and_may_choose_it_for_good
             ("en", "This phone is not paired"),
         ):
             page.click("#language")
-            expect(page.locator("html")).to_have_attribute("lang", language, timeout=WAIT_MS)
+            expect(page.locator("html")).to_have_attribute("lang", language)
             expect(page.locator("#problem-title")).to_have_text(title)
             page.reload()
             expect(page.locator("#problem-title")).to_have_text(title)

@@ -27,7 +27,6 @@ from tests.e2e.test_serve import mode, processes, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 SCREEN = {"viewport": {"width": 1280, "height": 720}}
-WAIT_MS = 30_000
 OTHER_PAGES = ("supervisor", "board", "screen", "fleet", "check")
 CAME_OFTEN = 28
 """Of the 32 connections that a stranger may make at once."""
@@ -68,26 +67,24 @@ def test_a_phone_is_let_in_by_one_click_beside_its_letters_and_shut_out_by_two(
     with browser(chromium, **SCREEN) as context:
         board, phone = context.new_page(), context.new_page()
         board.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
-        expect(board.locator("#people li")).to_have_count(1, timeout=WAIT_MS)
+        expect(board.locator("#people li")).to_have_count(1)
         link = server.link()
         phone.goto(f"{server.local_https}/{link}")
         phone.fill("#name", "Anna")
         phone.click("#start")
         letters = phone.locator("#match")
-        expect(letters).to_have_text(board.locator(".asking .match").inner_text(), timeout=WAIT_MS)
+        expect(letters).to_have_text(board.locator(".asking .match").inner_text())
         assert link[3:] not in phone.url
         board.click(".asking .confirm")
         row = board.locator("#people li", has_text="Anna")
-        expect(row).to_be_visible(timeout=WAIT_MS)
-        expect(phone.locator("#pairing")).to_be_hidden(timeout=WAIT_MS)
+        expect(row).to_be_visible()
+        expect(phone.locator("#pairing")).to_be_hidden()
         row.locator(".revoke").click()
-        expect(row.locator(".revoke")).to_have_text("Really?", timeout=WAIT_MS)
+        expect(row.locator(".revoke")).to_have_text("Really?")
         row.locator(".revoke").click()
-        expect(row).to_have_count(0, timeout=WAIT_MS)
+        expect(row).to_have_count(0)
         phone.reload()
-        expect(phone.locator("#problem-title")).to_have_text(
-            "This browser is not let in", timeout=WAIT_MS
-        )
+        expect(phone.locator("#problem-title")).to_have_text("This browser is not let in")
 
 
 def test_a_page_that_is_shut_out_or_too_old_keeps_stop_and_says_what_became_of_it(
@@ -103,16 +100,14 @@ def test_a_page_that_is_shut_out_or_too_old_keeps_stop_and_says_what_became_of_i
         expect(phone.locator("#last-stop")).to_be_hidden()
         phone.fill("#name", "Olga")
         phone.click("#start")
-        expect(phone.locator("#problem-title")).to_have_text(
-            "The server has been updated", timeout=WAIT_MS
-        )
+        expect(phone.locator("#problem-title")).to_have_text("The server has been updated")
         phone.click("#last-stop-button")
         words = phone.locator("#last-stop-words")
-        expect(words).to_contain_text("STOPPED", timeout=WAIT_MS)
+        expect(words).to_contain_text("STOPPED")
         until(lambda: mode(server) == "STOPPED", 5.0, "STOPPED")  # a status is 100 ms old
         server.request("POST", "/api/people/revoke", {"id": ids(server)["Olga"]})
         phone.click("#last-stop-button")
-        expect(words).to_contain_text("STOP was refused", timeout=WAIT_MS)
+        expect(words).to_contain_text("STOP was refused")
         expect(words).to_contain_text("A supervisor has ended this pairing")
         with phone.expect_request("**/api/stop"):
             phone.click("#last-stop-button")
@@ -124,13 +119,13 @@ def test_a_supervisors_browser_that_opens_a_lesser_link_is_asked_and_may_keep_wh
     with browser(chromium, **SCREEN) as context:
         page = context.new_page()
         page.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
-        expect(page.locator("#people li")).not_to_have_count(0, timeout=WAIT_MS)
+        expect(page.locator("#people li")).not_to_have_count(0)
         for answer, role in (("keep", "supervisor"), ("take", "viewer")):
             other = context.new_page()
             other.goto(f"{server.http_url}/supervisor{server.link('viewer')}")
-            expect(other.locator("#choice-title")).to_contain_text("it supervises", timeout=WAIT_MS)
+            expect(other.locator("#choice-title")).to_contain_text("it supervises")
             other.click(f"#choice-{answer}")
-            expect(other.locator("body")).to_have_attribute("data-role", role, timeout=WAIT_MS)
+            expect(other.locator("body")).to_have_attribute("data-role", role)
 
 
 def test_a_screen_that_was_left_while_it_waited_takes_no_place_when_it_is_let_in(
@@ -141,7 +136,7 @@ def test_a_screen_that_was_left_while_it_waited_takes_no_place_when_it_is_let_in
         screen.on("websocket", lambda socket: opened.append(socket.url))
         screen.goto(f"{server.local_https}/screen{server.link()}")
         screen.click("#start")
-        expect(screen.locator("#why")).to_contain_text("Waiting to be let in", timeout=WAIT_MS)
+        expect(screen.locator("#why")).to_contain_text("Waiting to be let in")
         screen.evaluate("document.exitFullscreen()")
         expect(screen.locator("#setup")).to_be_visible()
         people = server.request("GET", "/api/status")["people"]
@@ -151,7 +146,7 @@ def test_a_screen_that_was_left_while_it_waited_takes_no_place_when_it_is_let_in
         server.request("POST", "/api/people/confirm", told)
         screen.wait_for_timeout(3e3)  # it asks each second
         assert not opened
-        with screen.expect_websocket(timeout=WAIT_MS):
+        with screen.expect_websocket():
             screen.click("#start")
 
 
@@ -159,7 +154,7 @@ def test_a_viewers_page_shows_all_and_offers_stop_alone(chromium: str, server: S
     with browser(chromium, **SCREEN) as context:
         page = context.new_page()
         page.goto(f"{server.http_url}/supervisor{server.link('viewer')}")
-        expect(page.locator("#people li")).not_to_have_count(0, timeout=WAIT_MS)
+        expect(page.locator("#people li")).not_to_have_count(0)
         buttons = page.locator("button:visible")
         assert [one.strip() for one in buttons.all_inner_texts()] == ["STOP"]
 
@@ -176,7 +171,7 @@ def test_a_phones_page_comes_whole_though_its_address_has_come_too_often(
                 one.shutdown(socket.SHUT_WR)
                 assert one.recv(1) == b""
         page.goto(f"{server.https_url}/{server.link()}")
-        expect(page.locator("#start")).to_be_visible(timeout=WAIT_MS)
+        expect(page.locator("#start")).to_be_visible()
         assert failed == []
 
 
@@ -190,7 +185,7 @@ def test_a_phones_page_that_lacks_a_file_says_so_and_a_whole_one_does_not(
             page.goto(f"{server.local_https}/")
             page.wait_for_load_state("load")
         expect(lacking.locator("#step span")).not_to_be_visible()
-        expect(lacking.locator("#step span")).to_be_visible(timeout=WAIT_MS)
+        expect(lacking.locator("#step span")).to_be_visible()
         expect(lacking.locator("#step")).to_contain_text("load it again")
         expect(whole.locator("#problem")).to_be_visible()
         expect(whole.locator("#step span")).to_have_count(0)
@@ -204,7 +199,7 @@ def test_each_other_page_that_lacks_its_scripts_says_so(chromium: str, server: S
             page.goto(f"{server.http_url}/{name}")
             expect(page.locator(".late")).not_to_be_visible()
         for page in pages.values():
-            expect(page.locator(".late")).to_be_visible(timeout=WAIT_MS)
+            expect(page.locator(".late")).to_be_visible()
             expect(page.locator(".late")).to_contain_text("load it again")
 
 

@@ -15,7 +15,6 @@ from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import status, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
-WAIT_MS = 60_000
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +35,7 @@ def page(context: BrowserContext, server: Serving) -> Iterator[Page]:
     one = context.new_page()
     one.route("**/view/", lambda route: route.abort())  # drawn without a graphics card
     one.goto(f"{server.http_url}/supervisor{server.link('viewer')}")
-    expect(one.locator("#mode")).to_have_text("DISARMED", timeout=WAIT_MS)
+    expect(one.locator("#mode")).to_have_text("DISARMED")
     one.goto(f"{server.http_url}/check")
     yield one
     one.close()
@@ -46,15 +45,15 @@ def test_a_phone_is_listened_to_and_what_was_found_can_be_kept(page: Page, serve
     asked: list[str] = []
     page.on("request", lambda request: asked.append(f"{request.method} {request.url}"))
     page.click("#minute")
-    expect(page.locator("#hint")).to_contain_text("while a phone leads", timeout=WAIT_MS)
+    expect(page.locator("#hint")).to_contain_text("while a phone leads")
     assert page.locator(".line").count() == 0
     server.request("POST", "/api/virtual-phone")
     try:
         until(lambda: "virtual" in str(status(server)["operator"]), 30.0, "a virtual phone")
         expect(page.locator(".line", has_text="Robot found").locator(".grade")).to_have_text(
-            "✓ good", timeout=WAIT_MS
+            "✓ good"
         )
-        expect(page.locator("#enough")).to_be_enabled(timeout=WAIT_MS)
+        expect(page.locator("#enough")).to_be_enabled()
         page.click("#enough")
     finally:
         server.request("DELETE", "/api/virtual-phone")
@@ -86,5 +85,5 @@ def test_who_is_not_let_in_is_told_so_and_shown_nothing(
         page = stranger.new_page()
         page.goto(f"{server.http_url}/check")
         page.click("#minute")
-        expect(page.locator("#hint")).to_contain_text("pair first", timeout=WAIT_MS)
+        expect(page.locator("#hint")).to_contain_text("pair first")
         assert page.locator(".line").count() == 0

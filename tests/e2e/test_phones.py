@@ -16,7 +16,6 @@ from tests.e2e.test_serve import until
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
 PHONE = {"viewport": {"width": 412, "height": 915}}
-WAIT_MS = 30_000
 PRESSED = ("wish", "stop", "hold")
 LOSES_CAMERA = """
 window.tracks = [];
@@ -49,7 +48,7 @@ def joined(context: BrowserContext, server: Serving, name: str) -> Page:
     page.goto(f"{server.local_https}/{server.link()}")
     page.fill("#name", name)
     page.click("#start")
-    page.wait_for_selector("#operate:visible", timeout=WAIT_MS)
+    page.wait_for_selector("#operate:visible")
     return page
 
 
@@ -70,7 +69,7 @@ def test_yesterdays_link_is_refused_in_words(chromium: str, server: Serving) -> 
         page.goto(f"{server.local_https}/#k=yesterday")
         if page.locator("#start").is_visible():
             page.tap("#start")
-        page.wait_for_selector("#problem:visible", timeout=WAIT_MS)
+        page.wait_for_selector("#problem:visible")
         assert "expired" in page.locator("#problem").inner_text().lower()
 
 
@@ -82,7 +81,7 @@ def test_a_phone_without_a_calibration_is_told_so_on_its_screen(
         page.add_init_script(CANVAS)
         page.goto(f"{server.local_https}/{server.link()}")
         page.tap("#start")
-        expect(page.locator("body")).to_contain_text("not calibrated", timeout=WAIT_MS)
+        expect(page.locator("body")).to_contain_text("not calibrated")
         expect(page.locator("body")).to_contain_text(DEVICE)
 
 
@@ -96,7 +95,7 @@ def test_with_text_twice_as_large_what_is_pressed_lies_on_the_screen(
         page.add_init_script(CANVAS)
         page.goto(f"{server.local_https}/{server.link()}")
         page.click("#start")
-        expect(page.locator("body")).to_contain_text("not calibrated", timeout=WAIT_MS)
+        expect(page.locator("body")).to_contain_text("not calibrated")
         page.evaluate("document.documentElement.style.fontSize = '200%'")
         boxes = {name: page.locator(f"#{name}").bounding_box() for name in PRESSED}
         for name, box in boxes.items():
@@ -120,7 +119,7 @@ def test_a_camera_that_is_taken_away_from_a_page_in_sight_is_opened_again(
         context.add_init_script(LOSES_CAMERA)
         page = joined(context, server, "Eva")
         page.evaluate("lose()")
-        expect(page.locator("#notice")).to_contain_text("does not come back", timeout=WAIT_MS)
+        expect(page.locator("#notice")).to_contain_text("does not come back")
         until(lambda: bool(page.evaluate("tracks.length === 2")), 30.0, "another track")
 
 
@@ -144,18 +143,16 @@ def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(
             mine.click("#handover-start")
             button = mine.locator("#handover-people button", has_text=heir)
             said = [server.request("GET", "/api/status")["people"], mine.inner_text("body")]
-            expect(button, f"{said}").to_be_visible(timeout=WAIT_MS)
+            expect(button, f"{said}").to_be_visible()
             button.click()
-            expect(mine.locator("#handover-title")).to_have_text(
-                f"Offered to {heir}", timeout=WAIT_MS
-            )
-            expect(other.locator("#handover-take")).to_be_enabled(timeout=WAIT_MS)
+            expect(mine.locator("#handover-title")).to_have_text(f"Offered to {heir}")
+            expect(other.locator("#handover-take")).to_be_enabled()
             status = server.request("GET", "/api/status")
             assert (status["phones"], status["ready"], leaders(server)) == (0, False, [])
             other.click(f"#{answer}")
             leads, waits = (mine, other) if answer == "handover-leave" else (other, mine)
-            expect(leads.locator("#handover-start")).to_be_visible(timeout=WAIT_MS)
-            expect(waits.locator("#reason")).to_contain_text("leads.", timeout=WAIT_MS)
+            expect(leads.locator("#handover-start")).to_be_visible()
+            expect(waits.locator("#reason")).to_contain_text("leads.")
         assert leaders(server) == [heir]
         mine.click("#stop")
-        expect(mine.locator("#mode")).to_have_text("STOPPED", timeout=WAIT_MS)
+        expect(mine.locator("#mode")).to_have_text("STOPPED")
