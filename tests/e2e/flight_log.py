@@ -31,6 +31,8 @@ CAUSE_S = 1.0
 """Between a hole and what it led to."""
 SHOWN_S = 0.05
 WAITED = "armed_stall_waited_ms"
+BY_KERNEL = (WAITED, "recent_stall_waited_ms")
+"""What the kernel tells the server of: in the world's time."""
 MOST_FLIGHTS = 4
 """Tried for one that is wanted, on a machine that is proven to have been away each time."""
 KEPT = ("mode", "reason", "server")
@@ -75,6 +77,8 @@ class FlightLog:
                 told = json.loads(data)
                 if told["type"] == "status":
                     self.newest = told
+                    server = told["server"]
+                    server |= {name: own_s(server[name]) for name in BY_KERNEL if name in server}
                     self._keep(Said(time.monotonic(), *(told[k] for k in KEPT)))
 
     def _keep(self, said: Said) -> None:
@@ -132,7 +136,7 @@ class Flight:
     @property
     def starved(self) -> list[Hole]:
         """When the server, in its own words, was longer without a processor than ever before."""
-        told = [(said.t, own_s(1e-3 * said.server.get(WAITED, 0.0))) for said in self.said]
+        told = [(said.t, 1e-3 * said.server.get(WAITED, 0.0)) for said in self.said]
         grown = pairwise(told)
         return [Hole("server", t, s) for (_, before), (t, s) in grown if s > before]
 
