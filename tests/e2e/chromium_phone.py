@@ -40,17 +40,22 @@ def browser(
     executable: str,
     camera_file: Path | None = None,
     flags: tuple[str, ...] = (),
+    beside: BrowserContext | None = None,
     **options: object,
 ) -> Iterator[BrowserContext]:
     """A context with everything granted that the phone page asks for.
 
-    The camera plays `camera_file` (y4m) round and round, or else a pattern of Chromium's own.
+    The camera plays `camera_file` (y4m) round and round, or else a pattern of Chromium's own. One
+    thread drives one browser, or others `beside` it.
     """
     played = [f"--use-file-for-fake-video-capture={camera_file}"] if camera_file else []
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=executable, args=[*FLAGS, *played, *flags]
-        )
+    with contextlib.ExitStack() as stack:
+        if beside is None:
+            kind = stack.enter_context(sync_playwright()).chromium
+        else:
+            assert beside.browser is not None
+            kind = beside.browser.browser_type
+        chromium = kind.launch(executable_path=executable, args=[*FLAGS, *played, *flags])
         context = chromium.new_context(
             ignore_https_errors=True,
             permissions=["camera", "accelerometer", "gyroscope", "magnetometer"],
@@ -65,13 +70,16 @@ def browser(
 class ChromiumPhone(PlayedPhone):
     """A page in Chromium."""
 
+    PLAYED = PLAYED
+    """What the page is told before it runs: what its camera films, and what its sensors feel."""
+
     def __init__(
         self, context: BrowserContext, hand: Hand, leds_in_b: np.ndarray, truth_port: int
     ) -> None:
         """`leds_in_b` (n, 3) [m]."""
         super().__init__(hand, leds_in_b, truth_port, 90.0)  # a phone emulated in landscape
         self.page: Page = context.new_page()
-        self.page.add_init_script(PLAYED + STAMP_SENSORS)
+        self.page.add_init_script(self.PLAYED + STAMP_SENSORS)
         url = address(context, self.page)
         hurry(context)
         self._channel, self._touches = Channel(url), False

@@ -94,18 +94,23 @@ class DrawnGlass:
         times = [drawn for drawn, _ in tuple(self._frames)]
         return (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
 
-    def _order(self, number: int, method: str, **given: object) -> None:
+    def _send(self, number: int, method: str, **given: object) -> None:
         self._socket.send(json.dumps({"id": number, "method": method, "params": given}))
+
+    def _order(self, number: int, method: str, **given: object) -> None:
+        self._send(number, method, **given)
         while json.loads(self._socket.recv()).get("id") != number:
             pass
 
     def _listen(self) -> None:
         with contextlib.suppress(ConnectionClosed):
             for data in self._socket:
-                event: dict[str, Any] = json.loads(data)
-                if event.get("method") == "Runtime.bindingCalled":
-                    ms, px, dots = json.loads(event["params"]["payload"])
-                    middle, px_m = 0.5 * np.array(px), px[0] / GLASS.width_m
-                    right_low = (np.reshape(dots, (-1, 2)) - middle) / px_m
-                    self.drawn.append(1e-3 * ms - self._behind_s)
-                    self._frames.append((self.drawn[-1], right_low * (1.0, -1.0)))
+                self._hear(json.loads(data))
+
+    def _hear(self, event: dict[str, Any]) -> None:
+        if event.get("method") == "Runtime.bindingCalled":
+            ms, px, dots = json.loads(event["params"]["payload"])
+            middle, px_m = 0.5 * np.array(px), px[0] / GLASS.width_m
+            right_low = (np.reshape(dots, (-1, 2)) - middle) / px_m
+            self.drawn.append(1e-3 * ms - self._behind_s)
+            self._frames.append((self.drawn[-1], right_low * (1.0, -1.0)))

@@ -8,8 +8,8 @@ BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
     return stream;
   }};"""
 """What is painted on `canvas` is what the page's camera sees."""
-PAINTED_CAMERA = f"""{BE_CAMERA}
-  let [stamp, painted] = [() => {{}}, -Infinity];
+STAMPED_CAMERA = f"""{BE_CAMERA}
+  let stamp = () => {{}};
   if (window.MediaStreamTrackGenerator) {{
     navigator.mediaDevices.getUserMedia = async () => {{
       const track = new MediaStreamTrackGenerator({{kind: 'video'}});
@@ -22,7 +22,12 @@ PAINTED_CAMERA = f"""{BE_CAMERA}
       window.filming = new MediaStream([track]);
       return filming;
     }};
-  }}
+  }}"""
+"""The same camera films `canvas` when `stamp` is called, and stamps the picture with the time that
+it is given [ms] where the browser permits it, as a camera's hardware does: the browser stamps a
+canvas when it comes to read it, on a busy machine up to 36 ms late."""
+PAINTED_CAMERA = f"""{STAMPED_CAMERA}
+  let painted = -Infinity;
   const onFrame = () => {{
     requestAnimationFrame(onFrame);
     const ms = performance.now();
@@ -32,9 +37,7 @@ PAINTED_CAMERA = f"""{BE_CAMERA}
     stamp(ms);
   }};
   onFrame();"""
-"""The same camera films what `paintAt` paints on `canvas` for a time [ms], and stamps it with that
-where the browser permits it, as a camera's hardware does: the browser stamps a canvas when it comes
-to read it, on a busy machine up to 36 ms late."""
+"""That camera films what `paintAt` paints on `canvas` for a time [ms]."""
 FELT = """
 (() => {
   const told = [];

@@ -46,13 +46,18 @@ class FlownPictures(DelayedStream):
 
 
 def in_virtual_time(
-    robot: str, hand: str, seed: int, seconds: float, flown: ScreenFlown | None = None
+    robot: str,
+    hand: str,
+    seed: int,
+    seconds: float,
+    flown: ScreenFlown | None = None,
+    pictures_hz: float = PICTURES_HZ,
 ) -> float:
-    """RMS error [mm] since the press: by the usual pictures, or as those of a flight came."""
+    """RMS error [mm] since the press: by usual pictures, or as those of a flight came."""
     robot_file = load_robot(robot, takes=COMMANDS)
     camera = TeleopConfig().virtual_camera
     config = teleop_config(robot_file, "phone", camera, "relative")
-    scene = SimulationOptions(hand=hand, seed=seed, frame_rate_hz=PICTURES_HZ)
+    scene = SimulationOptions(hand=hand, seed=seed, frame_rate_hz=pictures_hz)
     held = make_hand(hand, seed=seed, start=robot_file.start, rest_s=REST_S)
     display = Display(GLASS, LAG_S, TILT_RAD)
     if flown is not None:

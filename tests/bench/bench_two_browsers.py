@@ -1,0 +1,102 @@
+"""A robot of light led by one Chromium that films another's page, to what it is in virtual time.
+
+    python -m tests.slow_motion --factor 4 python -m tests.bench.bench_two_browsers
+        [--robots screen,so101] [--seconds 60] [--seed 1000]
+
+Pixels all the way: what one browser shows of `/screen` is put into the other's camera as a hand
+holds it, whose motion the phone page feels. Two browsers, their pictures and the server's processes
+on two processors need slow motion.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from server.common.options import Parser
+from server.common.ranges import number, seed_number
+from server.common.text import Column, dashed
+from tests.bench.bench_screen import HANDS
+from tests.e2e.conftest import wanted_chromium
+from tests.e2e.played_phone import PlayedPhone
+from tests.e2e.screen_alike import in_virtual_time
+from tests.e2e.two_browsers import PICTURES_HZ, lead
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("robot", "robot", "{}"),
+    ("hand", "hand", "{}"),
+    ("tracked_s", "tracked s", "{:.0f}"),
+    ("rms_mm", "RMS mm", "{:.2f}"),
+    ("virtual_mm", "virtual time mm", "{:.2f}"),
+    ("ratio", "ratio", "{:.2f}"),
+    ("shown_hz", "shown Hz", "{:.1f}"),
+    ("pictures_hz", "pictures Hz", "{:.1f}"),
+    ("off_px", "dots off px", "{:.3f}"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One flight; see `Filmed`."""
+
+    robot: str
+    hand: str
+    tracked_s: float
+    rms_mm: float
+    virtual_mm: float
+    """The same hand's, in virtual time."""
+    ratio: float
+    shown_hz: float
+    pictures_hz: float
+    off_px: float
+
+
+def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
+    """One flight in real time, one in virtual time.
+
+    Raises:
+        AssertionError: it did not reach its end; with its account.
+    """
+    hand = HANDS[robot]
+    with tempfile.TemporaryDirectory() as folder:
+        filmed = lead(chromium, Path(folder), robot, hand, seed, seconds)
+    flight = filmed.flight
+    assert not flight.ended, flight.account()
+    virtual_mm = in_virtual_time(robot, hand, seed, seconds, pictures_hz=PICTURES_HZ)
+    rms_mm = PlayedPhone.rms_mm(flight.distances, 0.0)
+    return Row(
+        robot=robot,
+        hand=hand,
+        tracked_s=seconds * flight.following,
+        rms_mm=rms_mm,
+        virtual_mm=virtual_mm,
+        ratio=rms_mm / virtual_mm,
+        shown_hz=filmed.shown_hz,
+        pictures_hz=filmed.pictures_hz,
+        off_px=filmed.off_px,
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Fly and print."""
+    parser = Parser(prog="bench_two_browsers", description=__doc__,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+    parser.add_argument("--robots", default=",".join(HANDS), help=", ".join(HANDS))
+    parser.add_argument("--seconds", type=number(5.0, 600.0), default=60.0, help="each is led")
+    parser.add_argument("--seed", type=seed_number, default=1000, help="of the hand")
+    arguments = parser.parse_args(argv)
+    robots = arguments.robots.split(",")
+    if not set(robots) <= set(HANDS):
+        parser.error(f"--robots {arguments.robots}: allowed: {', '.join(HANDS)}")
+    chromium = wanted_chromium()
+    rows = [fly(chromium, robot, arguments.seed, arguments.seconds) for robot in robots]
+    sys.stdout.write(f"{dashed(COLUMNS, rows)}\n")
+
+
+if __name__ == "__main__":
+    main()
