@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -76,21 +76,24 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
     )
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    """Fly and print."""
-    parser = Parser(prog="bench_screen", description=__doc__,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+def print_flights(
+    description: str | None,
+    fly: Callable[[str, str, int, float], object],
+    columns: Sequence[Column],
+) -> None:
+    """Fly as a command line asks, by (Chromium, robot, seed, seconds), and print a row of each."""
+    parser = Parser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robots", default=",".join(HANDS), help=", ".join(HANDS))
     parser.add_argument("--seconds", type=number(5.0, 600.0), default=60.0, help="each is led")
     parser.add_argument("--seed", type=seed_number, default=1000, help="of the hand")
-    arguments = parser.parse_args(argv)
+    arguments = parser.parse_args()
     robots = arguments.robots.split(",")
     if not set(robots) <= set(HANDS):
         parser.error(f"--robots {arguments.robots}: allowed: {', '.join(HANDS)}")
     chromium = wanted_chromium()
     rows = [fly(chromium, robot, arguments.seed, arguments.seconds) for robot in robots]
-    sys.stdout.write(f"{dashed(COLUMNS, rows)}\n")
+    sys.stdout.write(f"{dashed(columns, rows)}\n")
 
 
 if __name__ == "__main__":
-    main()
+    print_flights(__doc__, fly, COLUMNS)

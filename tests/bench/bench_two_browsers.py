@@ -10,19 +10,13 @@ on two processors need slow motion.
 
 from __future__ import annotations
 
-import argparse
-import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from server.common.options import Parser
-from server.common.ranges import number, seed_number
-from server.common.text import Column, dashed
-from tests.bench.bench_screen import HANDS
-from tests.e2e.conftest import wanted_chromium
+from server.common.text import Column
+from tests.bench.bench_screen import HANDS, print_flights
 from tests.e2e.played_phone import PlayedPhone
 from tests.e2e.screen_alike import in_virtual_time
 from tests.e2e.two_browsers import PICTURES_HZ, lead
@@ -82,21 +76,5 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
     )
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    """Fly and print."""
-    parser = Parser(prog="bench_two_browsers", description=__doc__,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
-    parser.add_argument("--robots", default=",".join(HANDS), help=", ".join(HANDS))
-    parser.add_argument("--seconds", type=number(5.0, 600.0), default=60.0, help="each is led")
-    parser.add_argument("--seed", type=seed_number, default=1000, help="of the hand")
-    arguments = parser.parse_args(argv)
-    robots = arguments.robots.split(",")
-    if not set(robots) <= set(HANDS):
-        parser.error(f"--robots {arguments.robots}: allowed: {', '.join(HANDS)}")
-    chromium = wanted_chromium()
-    rows = [fly(chromium, robot, arguments.seed, arguments.seconds) for robot in robots]
-    sys.stdout.write(f"{dashed(COLUMNS, rows)}\n")
-
-
 if __name__ == "__main__":
-    main()
+    print_flights(__doc__, fly, COLUMNS)
