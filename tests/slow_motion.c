@@ -235,12 +235,11 @@ int pthread_cond_timedwait(pthread_cond_t *restrict one, pthread_mutex_t *restri
 {
     static int (*libc)(pthread_cond_t *, pthread_mutex_t *, const struct timespec *);
     struct timespec later;
-    void *found = NULL;
 
     if (!libc)
-        found = dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2");
+        libc = dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2");
     if (!libc)
-        libc = found ? found : dlsym(RTLD_NEXT, "pthread_cond_timedwait");
+        libc = dlsym(RTLD_NEXT, "pthread_cond_timedwait");
     pthread_once(&learnt, learn);
     later = moment(clock_of(t), t);
     return libc(one, mutex, &later);

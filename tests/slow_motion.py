@@ -24,6 +24,7 @@ from typing import Final
 
 import numpy as np
 
+from server.common.ranges import number
 from tests.machine import SLOW_MOTION, slowness
 
 SOURCE = Path(__file__).with_suffix(".c")
@@ -70,7 +71,9 @@ def environment(factor: float, folder: Path) -> dict[str, str]:
 def main() -> int:
     """Run a command; gives its exit status."""
     parser = argparse.ArgumentParser(prog="tests.slow_motion", description=__doc__)
-    parser.add_argument("--factor", type=float, help="in place of what this machine needs")
+    parser.add_argument(
+        "--factor", type=number(1.0, 20.0), help="in place of what this machine needs"
+    )
     parser.add_argument("command", nargs=argparse.REMAINDER)
     asked = parser.parse_args()
     slower = asked.factor or needed_factor()

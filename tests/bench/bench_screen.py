@@ -24,13 +24,17 @@ from tests.e2e.screen_alike import in_virtual_time
 from tests.e2e.screen_rig import lead
 
 HANDS: Final = {"screen": "moving", "so101": "filming"}
-COLUMNS: Final[tuple[Column, ...]] = (
+COMPARED: Final[tuple[Column, ...]] = (
     ("robot", "robot", "{}"),
     ("hand", "hand", "{}"),
     ("tracked_s", "tracked s", "{:.0f}"),
     ("rms_mm", "RMS mm", "{:.2f}"),
     ("virtual_mm", "virtual time mm", "{:.2f}"),
     ("ratio", "ratio", "{:.2f}"),
+)
+"""Of each `ComparedRow`."""
+COLUMNS: Final[tuple[Column, ...]] = (
+    *COMPARED,
     ("alike_mm", "by its pictures and frames mm", "{:.2f}"),
     ("frames_hz", "frames Hz", "{:.1f}"),
     ("pictures_hz", "pictures Hz", "{:.1f}"),
@@ -39,8 +43,8 @@ COLUMNS: Final[tuple[Column, ...]] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One flight; see `ScreenFlown`."""
+class ComparedRow:
+    """One flight, to virtual time."""
 
     robot: str
     hand: str
@@ -48,7 +52,17 @@ class Row:
     rms_mm: float
     virtual_mm: float
     """The same hand's, in virtual time."""
-    ratio: float
+
+    @property
+    def ratio(self) -> float:
+        """To virtual time."""
+        return self.rms_mm / self.virtual_mm
+
+
+@dataclass(frozen=True, slots=True)
+class Row(ComparedRow):
+    """One flight; see `ScreenFlown`."""
+
     alike_mm: float
     """In virtual time by this flight's pictures and its page's frames, each as late as here."""
     frames_hz: float
@@ -61,14 +75,12 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
     hand = HANDS[robot]
     with tempfile.TemporaryDirectory() as folder:
         flown = lead(chromium, Path(folder), robot, hand, seed, seconds)
-    virtual_mm = in_virtual_time(robot, hand, seed, seconds)
     return Row(
         robot=robot,
         hand=hand,
         tracked_s=flown.tracked_s,
         rms_mm=flown.rms_mm,
-        virtual_mm=virtual_mm,
-        ratio=flown.rms_mm / virtual_mm,
+        virtual_mm=in_virtual_time(robot, hand, seed, seconds),
         alike_mm=in_virtual_time(robot, hand, seed, seconds, flown),
         frames_hz=flown.frames_hz,
         pictures_hz=flown.pictures_hz,

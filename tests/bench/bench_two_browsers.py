@@ -16,18 +16,13 @@ from pathlib import Path
 from typing import Final
 
 from server.common.text import Column
-from tests.bench.bench_screen import HANDS, print_flights
+from tests.bench.bench_screen import COMPARED, HANDS, ComparedRow, print_flights
 from tests.e2e.played_phone import PlayedPhone
 from tests.e2e.screen_alike import in_virtual_time
 from tests.e2e.two_browsers import PICTURES_HZ, lead
 
 COLUMNS: Final[tuple[Column, ...]] = (
-    ("robot", "robot", "{}"),
-    ("hand", "hand", "{}"),
-    ("tracked_s", "tracked s", "{:.0f}"),
-    ("rms_mm", "RMS mm", "{:.2f}"),
-    ("virtual_mm", "virtual time mm", "{:.2f}"),
-    ("ratio", "ratio", "{:.2f}"),
+    *COMPARED,
     ("shown_hz", "shown Hz", "{:.1f}"),
     ("pictures_hz", "pictures Hz", "{:.1f}"),
     ("off_px", "dots off px", "{:.3f}"),
@@ -35,16 +30,9 @@ COLUMNS: Final[tuple[Column, ...]] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class Row(ComparedRow):
     """One flight; see `Filmed`."""
 
-    robot: str
-    hand: str
-    tracked_s: float
-    rms_mm: float
-    virtual_mm: float
-    """The same hand's, in virtual time."""
-    ratio: float
     shown_hz: float
     pictures_hz: float
     off_px: float
@@ -61,15 +49,12 @@ def fly(chromium: str, robot: str, seed: int, seconds: float) -> Row:
         filmed = lead(chromium, Path(folder), robot, hand, seed, seconds)
     flight = filmed.flight
     assert not flight.ended, flight.account()
-    virtual_mm = in_virtual_time(robot, hand, seed, seconds, pictures_hz=PICTURES_HZ)
-    rms_mm = PlayedPhone.rms_mm(flight.distances, 0.0)
     return Row(
         robot=robot,
         hand=hand,
         tracked_s=seconds * flight.following,
-        rms_mm=rms_mm,
-        virtual_mm=virtual_mm,
-        ratio=rms_mm / virtual_mm,
+        rms_mm=PlayedPhone.rms_mm(flight.distances, 0.0),
+        virtual_mm=in_virtual_time(robot, hand, seed, seconds, pictures_hz=PICTURES_HZ),
         shown_hz=filmed.shown_hz,
         pictures_hz=filmed.pictures_hz,
         off_px=filmed.off_px,

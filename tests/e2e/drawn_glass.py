@@ -7,6 +7,7 @@ import json
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -91,8 +92,7 @@ class DrawnGlass:
 
     def frames_hz(self) -> float:
         """How many it draws in a second, lately."""
-        times = [drawn for drawn, _ in tuple(self._frames)]
-        return (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0
+        return rate_hz([drawn for drawn, _ in tuple(self._frames)])
 
     def _send(self, number: int, method: str, **given: object) -> None:
         self._socket.send(json.dumps({"id": number, "method": method, "params": given}))
@@ -114,3 +114,8 @@ class DrawnGlass:
             right_low = (np.reshape(dots, (-1, 2)) - middle) / px_m
             self.drawn.append(1e-3 * ms - self._behind_s)
             self._frames.append((self.drawn[-1], right_low * (1.0, -1.0)))
+
+
+def rate_hz(times: Sequence[float]) -> float:
+    """How many a second come at these times [s]; 0 of one."""
+    return (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else 0.0

@@ -19,7 +19,7 @@ from hardware.sim.truth import Truth, TruthClient
 from server.common import clock
 from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.chromium_rig import LANDSCAPE, calibrate, flight, start
-from tests.e2e.drawn_glass import SIZE
+from tests.e2e.drawn_glass import SIZE, rate_hz
 from tests.e2e.filmed_glass import FilmedGlass
 from tests.e2e.flight_log import Flight
 from tests.e2e.page_scripts import FELT, STAMPED_CAMERA, TICKER
@@ -45,7 +45,7 @@ FILMING: Final = """
 SEEN: Final = FILMING.replace("WIDTH", str(CAMERA.width)).replace("HEIGHT", str(CAMERA.height))
 
 
-class FilmingPhone(ChromiumPhone):
+class GlassPhone(ChromiumPhone):
     """A page in Chromium whose camera films a glass."""
 
     PLAYED = SEEN + FELT + TICKER
@@ -101,18 +101,14 @@ def lead(chromium: str, folder: Path, robot: str, hand: str, seed: int, seconds:
             hand, seed=seed, start=robot_file.start, p_robot_in_f=robot_at, t_start=moves_at
         )
         glass = FilmedGlass(wide, server, motion, leds_in_b.mean(axis=0))
-        phone = FilmingPhone(narrow, motion, leds_in_b, server.truth_port)
+        phone = GlassPhone(narrow, motion, leds_in_b, server.truth_port)
         phone.moves_at, phone.glass = moves_at, glass
         with contextlib.closing(phone), contextlib.closing(glass):
             start(phone, server)
             flown = flight(phone, server, seconds)
         return Filmed(
             flight=flown,
-            shown_hz=_rate_hz(glass.shown),
-            pictures_hz=_rate_hz(phone.filmed[1:]),
+            shown_hz=rate_hz(glass.shown),
+            pictures_hz=rate_hz(phone.filmed[1:]),
             off_px=float(np.median(glass.off_px)),
         )
-
-
-def _rate_hz(times: list[float]) -> float:
-    return (len(times) - 1) / (times[-1] - times[0])
